@@ -1,0 +1,1 @@
+//! The reference backend: the whole hierarchy resident, nothing clever.

@@ -1,0 +1,18 @@
+//! What the refinement criterion knows of a node.
+
+/// Bounding sphere and error of a node, in object space and object units, as stored.
+///
+/// The sphere holds every input triangle incident to any leaf below the node, and the spheres of all nodes that
+/// must be folded before this one can be: a node whose sphere is out of view has nothing in view below it. `eps`
+/// estimates how far the input surface under the node lies from the surface shown while the node is folded; it is
+/// never less than that of a node that must be folded first.
+#[derive(Clone, Copy, Debug, PartialEq)]
+#[repr(C)]
+pub struct Bounds {
+    /// Centre of the sphere.
+    pub center: [f32; 3],
+    /// Radius of the sphere, at least 0.
+    pub radius: f32,
+    /// Geometric error, at least 0.
+    pub eps: f32,
+}

@@ -1,0 +1,29 @@
+//! The vocabulary that the engine and every storage backend share.
+//!
+//! A mesh is simplified once, by half-edge collapses, into a forest of vertex merges. The engine keeps an **active
+//! front** through that forest; a **backend** stores the forest and answers for it through [`VertexTree`]. This
+//! crate holds the trait, the types in its signatures, and the [`CollapseLog`] that every backend is built from.
+//! It decides nothing about paging. A backend depends on this crate alone.
+//!
+//! Terms, as in Zach & Karner (2003):
+//!
+//! * an inner node of the forest is a collapse; it is **active** while it is unfolded, that is, while both of the
+//!   vertices that it merged are (or have descendants that are) in the displayed mesh;
+//! * a **boundary node** is folded, but all its structural parents are active: it can be unfolded next;
+//! * an active node whose structural children are all folded is **collapsible**: it can be folded next.
+//!
+//! Leaves of the forest are the input vertices. They can not be unfolded and have no [`NodeId`].
+
+mod bounds;
+mod log;
+mod log_file;
+mod mesh;
+mod sink;
+mod tree;
+
+pub use bounds::Bounds;
+pub use log::{Collapse, CollapseLog, Forest, LogError, NONE};
+pub use log_file::{LogFileError, read_log, write_log};
+pub use mesh::Mesh;
+pub use sink::{MeshSink, NullSink, TriangleId, VertexId};
+pub use tree::{NodeId, PageStats, Step, TreeError, VertexTree};

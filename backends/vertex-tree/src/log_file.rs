@@ -1,0 +1,278 @@
+//! The collapse log as a file, little-endian throughout.
+//!
+//! ```text
+//! offset  bytes  field
+//!      0      8  magic "FFCOLLOG"
+//!      8      4  version, 1
+//!     12      4  attribute stride: bytes of further vertex attributes, 0 in version 1
+//!     16      8  V, number of vertices, at most 2^32 - 2
+//!     24      8  T, number of triangles, at most 2^32 - 2
+//!     32      8  C, number of collapses, less than V (0 if V is 0)
+//!     40      4  CRC-32 of bytes 0 to 39
+//!     44   12 V  positions: x y z as f32
+//!          12 T  triangles: three vertex numbers as u32
+//!          28 C  collapses, in order: removed u32, kept u32, centre 3 f32, radius f32, eps f32
+//!            12  CRC-32 of the positions, of the triangles, of the collapses
+//! ```
+//!
+//! The length of the file follows from the header and is checked before anything is allocated.
+
+use std::fs::File;
+use std::io::{self, BufReader, BufWriter, Read, Write};
+use std::path::{Path, PathBuf};
+
+use crate::{Bounds, Collapse, CollapseLog, LogError, Mesh};
+
+const MAGIC: [u8; 8] = *b"FFCOLLOG";
+const VERSION: u32 = 1;
+const HEADER_BYTES: u64 = 44;
+const CHECKSUMS_BYTES: u64 = 12;
+const VERTEX_BYTES: usize = 12;
+const TRIANGLE_BYTES: usize = 12;
+const COLLAPSE_BYTES: usize = 28;
+/// Records are converted this many at a time.
+const CHUNK: usize = 4096;
+
+/// A collapse log could not be read or written.
+#[derive(Debug, thiserror::Error)]
+#[non_exhaustive]
+pub enum LogFileError {
+    /// The operating system said no.
+    #[error("{}: {source}", file.display())]
+    Io {
+        /// The file.
+        file: PathBuf,
+        /// Why.
+        source: io::Error,
+    },
+    /// The file is something else.
+    #[error("{}: not a collapse log: the file does not start with \"FFCOLLOG\"", file.display())]
+    NotALog {
+        /// The file.
+        file: PathBuf,
+    },
+    /// The file was written by another version.
+    #[error("{}: offset 8: version {version}, expected {VERSION}", file.display())]
+    Version {
+        /// The file.
+        file: PathBuf,
+        /// As found.
+        version: u32,
+    },
+    /// The header names a vertex attribute layout that this version does not know.
+    #[error("{}: offset 12: attribute stride {stride}, expected 0", file.display())]
+    Attributes {
+        /// The file.
+        file: PathBuf,
+        /// As found.
+        stride: u32,
+    },
+    /// A count in the header is out of range.
+    #[error("{}: offset {offset}: count {count} out of range", file.display())]
+    Count {
+        /// The file.
+        file: PathBuf,
+        /// Where the count stands.
+        offset: u64,
+        /// As found.
+        count: u64,
+    },
+    /// The file is shorter or longer than its header says.
+    #[error("{}: {actual} bytes, but its header asks for {expected}", file.display())]
+    Length {
+        /// The file.
+        file: PathBuf,
+        /// What the header says.
+        expected: u64,
+        /// What there is.
+        actual: u64,
+    },
+    /// Bytes have changed since the file was written.
+    #[error("{}: offset {offset}: checksum of the {section} does not match", file.display())]
+    Checksum {
+        /// The file.
+        file: PathBuf,
+        /// Start of the damaged section.
+        offset: u64,
+        /// Its name.
+        section: &'static str,
+    },
+    /// The numbers are intact, but they do not make a log.
+    #[error("{}: {source}", file.display())]
+    Log {
+        /// The file.
+        file: PathBuf,
+        /// What does not fit.
+        source: LogError,
+    },
+}
+
+/// Writes a log: to a temporary name beside `path`, synced, then renamed, so that a failure leaves nothing behind.
+///
+/// # Errors
+/// [`LogFileError::Io`].
+pub fn write_log(path: &Path, log: &CollapseLog) -> Result<(), LogFileError> {
+    let io = |source| LogFileError::Io { file: path.to_owned(), source };
+    let folder = match path.parent() {
+        Some(p) if !p.as_os_str().is_empty() => p,
+        _ => Path::new("."),
+    };
+    let mut temporary = tempfile::Builder::new().prefix(".foldfront-").tempfile_in(folder).map_err(io)?;
+    {
+        let mut out = BufWriter::with_capacity(1 << 20, temporary.as_file_mut());
+        write_to(&mut out, log).and_then(|()| out.flush()).map_err(io)?;
+    }
+    temporary.as_file().sync_all().map_err(io)?;
+    temporary.persist(path).map_err(|e| io(e.error))?;
+    Ok(())
+}
+
+fn write_to(out: &mut impl Write, log: &CollapseLog) -> io::Result<()> {
+    let mut header = Vec::with_capacity(HEADER_BYTES as usize);
+    header.extend_from_slice(&MAGIC);
+    header.extend_from_slice(&VERSION.to_le_bytes());
+    header.extend_from_slice(&0_u32.to_le_bytes());
+    for count in [log.mesh.positions.len(), log.mesh.triangles.len(), log.collapses.len()] {
+        header.extend_from_slice(&(count as u64).to_le_bytes());
+    }
+    header.extend_from_slice(&crc32fast::hash(&header).to_le_bytes());
+    out.write_all(&header)?;
+    let checksums = [
+        write_section(out, &log.mesh.positions, |p, bytes| put(bytes, p.map(f32::to_le_bytes)))?,
+        write_section(out, &log.mesh.triangles, |t, bytes| put(bytes, t.map(u32::to_le_bytes)))?,
+        write_section(out, &log.collapses, |c, bytes| {
+            put(bytes, [c.removed.to_le_bytes(), c.kept.to_le_bytes()]);
+            put(bytes, c.bounds.center.map(f32::to_le_bytes));
+            put(bytes, [c.bounds.radius.to_le_bytes(), c.bounds.eps.to_le_bytes()]);
+        })?,
+    ];
+    for checksum in checksums {
+        out.write_all(&checksum.to_le_bytes())?;
+    }
+    Ok(())
+}
+
+fn put<const N: usize>(bytes: &mut Vec<u8>, words: [[u8; 4]; N]) {
+    bytes.extend_from_slice(words.as_flattened());
+}
+
+fn write_section<T>(
+    out: &mut impl Write,
+    records: &[T],
+    encode: impl Fn(&T, &mut Vec<u8>),
+) -> io::Result<u32> {
+    let mut checksum = crc32fast::Hasher::new();
+    let mut bytes = Vec::new();
+    for chunk in records.chunks(CHUNK) {
+        bytes.clear();
+        for record in chunk {
+            encode(record, &mut bytes);
+        }
+        checksum.update(&bytes);
+        out.write_all(&bytes)?;
+    }
+    Ok(checksum.finalize())
+}
+
+/// Reads a log and checks it.
+///
+/// # Errors
+/// Whatever is wrong with the file; a log that is returned passes [`CollapseLog::forest`].
+pub fn read_log(path: &Path) -> Result<CollapseLog, LogFileError> {
+    let io = |source| LogFileError::Io { file: path.to_owned(), source };
+    let file = File::open(path).map_err(io)?;
+    let actual = file.metadata().map_err(io)?.len();
+    let mut input = BufReader::with_capacity(1 << 20, file);
+    let mut header = [0; HEADER_BYTES as usize];
+    if actual < HEADER_BYTES {
+        let mut start = [0; MAGIC.len()];
+        return match input.read_exact(&mut start) {
+            Ok(()) if start == MAGIC => {
+                Err(LogFileError::Length { file: path.to_owned(), expected: HEADER_BYTES, actual })
+            }
+            _ => Err(LogFileError::NotALog { file: path.to_owned() }),
+        };
+    }
+    input.read_exact(&mut header).map_err(io)?;
+    let word = |at: usize| u32::from_le_bytes([header[at], header[at + 1], header[at + 2], header[at + 3]]);
+    let long = |at: usize| u64::from(word(at)) | u64::from(word(at + 4)) << 32;
+    if header[..8] != MAGIC {
+        return Err(LogFileError::NotALog { file: path.to_owned() });
+    }
+    if word(8) != VERSION {
+        return Err(LogFileError::Version { file: path.to_owned(), version: word(8) });
+    }
+    if crc32fast::hash(&header[..40]) != word(40) {
+        return Err(LogFileError::Checksum { file: path.to_owned(), offset: 0, section: "header" });
+    }
+    if word(12) != 0 {
+        return Err(LogFileError::Attributes { file: path.to_owned(), stride: word(12) });
+    }
+    let (vertices, triangles, collapses) = (long(16), long(24), long(32));
+    let most = u64::from(u32::MAX) - 1;
+    for (offset, count, limit) in [(16, vertices, most), (24, triangles, most), (32, collapses, vertices)] {
+        if count > limit {
+            return Err(LogFileError::Count { file: path.to_owned(), offset, count });
+        }
+    }
+    let positions_at = HEADER_BYTES;
+    let triangles_at = positions_at + vertices * VERTEX_BYTES as u64;
+    let collapses_at = triangles_at + triangles * TRIANGLE_BYTES as u64;
+    let checksums_at = collapses_at + collapses * COLLAPSE_BYTES as u64;
+    let expected = checksums_at + CHECKSUMS_BYTES;
+    if expected != actual {
+        return Err(LogFileError::Length { file: path.to_owned(), expected, actual });
+    }
+
+    let (positions, positions_sum) =
+        read_section(&mut input, vertices, |w: [u32; 3]| w.map(f32::from_bits)).map_err(io)?;
+    let (triangles, triangles_sum) = read_section(&mut input, triangles, |w: [u32; 3]| w).map_err(io)?;
+    let (collapses, collapses_sum) = read_section(&mut input, collapses, |w: [u32; 7]| Collapse {
+        removed: w[0],
+        kept: w[1],
+        bounds: Bounds {
+            center: [w[2], w[3], w[4]].map(f32::from_bits),
+            radius: f32::from_bits(w[5]),
+            eps: f32::from_bits(w[6]),
+        },
+    })
+    .map_err(io)?;
+    let (sums, _) = read_section(&mut input, 3, |[w]: [u32; 1]| w).map_err(io)?;
+    for (found, written, offset, section) in [
+        (positions_sum, sums[0], positions_at, "positions"),
+        (triangles_sum, sums[1], triangles_at, "triangles"),
+        (collapses_sum, sums[2], collapses_at, "collapses"),
+    ] {
+        if found != written {
+            return Err(LogFileError::Checksum { file: path.to_owned(), offset, section });
+        }
+    }
+    let log = CollapseLog { mesh: Mesh { positions, triangles }, collapses };
+    log.forest().map_err(|source| LogFileError::Log { file: path.to_owned(), source })?;
+    Ok(log)
+}
+
+/// Reads `count` records of `N` words each and their checksum.
+fn read_section<T, const N: usize>(
+    input: &mut impl Read,
+    count: u64,
+    decode: impl Fn([u32; N]) -> T,
+) -> io::Result<(Vec<T>, u32)> {
+    let mut records = Vec::with_capacity(count as usize);
+    let mut checksum = crc32fast::Hasher::new();
+    let mut bytes = vec![0; 4 * N * CHUNK];
+    let mut left = count as usize;
+    while left > 0 {
+        let now = left.min(CHUNK);
+        let chunk = &mut bytes[..4 * N * now];
+        input.read_exact(chunk)?;
+        checksum.update(chunk);
+        records.extend(chunk.chunks_exact(4 * N).map(|record| {
+            decode(std::array::from_fn(|i| {
+                u32::from_le_bytes([record[4 * i], record[4 * i + 1], record[4 * i + 2], record[4 * i + 3]])
+            }))
+        }));
+        left -= now;
+    }
+    Ok((records, checksum.finalize()))
+}

@@ -1,0 +1,132 @@
+//! The trait between the engine and the storage backends.
+
+use crate::{Bounds, MeshSink};
+
+/// Number of an inner node (a collapse) in a backend's own numbering, less than [`VertexTree::node_limit`].
+///
+/// The engine keeps flat arrays indexed by it, in memory that is not touched before it is used, so numbers should
+/// be dense, and nodes that are visited together should have numbers that are close: depth-first order is good.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
+#[repr(transparent)]
+pub struct NodeId(pub u32);
+
+impl NodeId {
+    /// The number as an array index.
+    #[must_use]
+    pub fn index(self) -> usize {
+        self.0 as usize
+    }
+}
+
+/// How a request to unfold or fold a node ended. Only [`Step::Done`] changes anything.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Step {
+    /// The node has changed its status, and the sink knows.
+    Done,
+    /// Unfolding: another node must be unfolded first, a dependency beyond structure (the nodes that bring the
+    /// faces w x y z in XFastMesh; neighbours with larger ids in El-Sana & Chiang). It may be anywhere below an
+    /// active node; the engine forces it, ancestors first, and asks again.
+    Needs(NodeId),
+    /// Folding: something unfolded depends on this node. It folds when nothing does any more.
+    StillNeeded,
+    /// The page that holds the node, or its children, is not in memory. It has been asked for, and the node will
+    /// be among the arrivals of a later [`VertexTree::begin_frame`].
+    NotResident,
+}
+
+/// What paging did in a frame.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct PageStats {
+    /// Read operations finished since the last call.
+    pub reads: u64,
+    /// Bytes those brought.
+    pub read_bytes: u64,
+    /// Bytes of the hierarchy now in memory.
+    pub resident_bytes: u64,
+}
+
+/// A backend can not go on: its store failed in a way that asking again will not mend.
+#[derive(Debug, thiserror::Error)]
+#[non_exhaustive]
+pub enum TreeError {
+    /// Reading from the store failed.
+    #[error("{file}: reading {length} bytes at offset {offset} failed")]
+    Read {
+        /// The file or store, as it was named to the backend.
+        file: String,
+        /// Where, in bytes from the start.
+        offset: u64,
+        /// How much.
+        length: usize,
+        /// Why.
+        source: std::io::Error,
+    },
+    /// A page does not hold what it should.
+    #[error("{file}: page at offset {offset} is damaged: {reason}")]
+    Damaged {
+        /// The file or store.
+        file: String,
+        /// Start of the page, in bytes.
+        offset: u64,
+        /// What is wrong with it.
+        reason: &'static str,
+    },
+}
+
+/// A forest of vertex merges (or a directed acyclic graph of them) that can be unfolded and folded node by node.
+///
+/// All nodes start folded: the displayed mesh is the base mesh. The engine promises to unfold only boundary nodes
+/// and to fold only collapsible ones. The backend promises that every order of such steps that ends in the same
+/// set of active nodes ends in the same displayed mesh.
+///
+/// # Structure and further dependencies
+///
+/// A node's *structural* parents are its parent in the tree, or all its parents in a multi-triangulation. Bounds
+/// are nested along them (see [`Bounds`]), so that the test of a child can only pass where that of each parent
+/// passes. What else must hold before a node may change is said by [`Step::Needs`] and [`Step::StillNeeded`].
+///
+/// # Residency
+///
+/// [`children`](Self::children), [`parents`](Self::parents) and [`bounds`](Self::bounds) are asked only of roots,
+/// of boundary and active nodes, and of the children of a node that has just been unfolded. The engine keeps
+/// what it needs of the rest, so a backend may drop the pages of active nodes that are not collapsible.
+pub trait VertexTree {
+    /// One more than the largest node number.
+    fn node_limit(&self) -> u32;
+    /// One more than the largest [`VertexId`](crate::VertexId).
+    fn vertex_count(&self) -> u32;
+    /// One more than the largest [`TriangleId`](crate::TriangleId).
+    fn triangle_count(&self) -> u32;
+    /// The inner nodes that have no structural parent.
+    fn roots(&self) -> &[NodeId];
+    /// Sphere and error of a node, as stored: strategies and the brute-force oracle read the same.
+    fn bounds(&self, node: NodeId) -> Bounds;
+    /// The nodes of which `node` is a structural parent.
+    fn children(&self, node: NodeId) -> impl Iterator<Item = NodeId>;
+    /// The structural parents, at least one but for a root, always in the same order.
+    fn parents(&self, node: NodeId) -> impl Iterator<Item = NodeId>;
+    /// The node's number in the collapse log, by which cuts of different backends can be compared.
+    fn log_number(&self, node: NodeId) -> u32;
+
+    /// Reports the base mesh: what is shown while every node is folded. Called once, before any other change.
+    fn base_mesh<M: MeshSink>(&mut self, mesh: &mut M) -> Result<(), TreeError>;
+    /// Unfolds a boundary node: its vertex splits in two.
+    fn unfold<M: MeshSink>(&mut self, node: NodeId, mesh: &mut M) -> Result<Step, TreeError>;
+    /// Folds a collapsible node: the inverse of [`unfold`](Self::unfold).
+    fn fold<M: MeshSink>(&mut self, node: NodeId, mesh: &mut M) -> Result<Step, TreeError>;
+
+    /// Says that `node` can not be unfolded before `ticks` ticks of the engine's clock have passed: a prefetch hint.
+    fn will_need(&mut self, node: NodeId, ticks: u32) {
+        let _ = (node, ticks);
+    }
+    /// Starts a frame. Appends to `arrived` the nodes for which a [`Step::NotResident`] was answered and that can
+    /// be asked again.
+    fn begin_frame(&mut self, arrived: &mut Vec<NodeId>) -> Result<(), TreeError> {
+        let _ = arrived;
+        Ok(())
+    }
+    /// Ends a frame: the moment for eviction.
+    fn end_frame(&mut self) -> Result<PageStats, TreeError> {
+        Ok(PageStats::default())
+    }
+}
