@@ -1,7 +1,16 @@
 //! Event-driven view-dependent level of detail.
 
+pub mod active_mesh;
+pub mod budget;
+pub mod criterion;
+pub mod engine;
+pub mod front;
 pub mod mesh_io;
+pub mod motion;
+pub mod oracle;
 pub mod path;
+pub mod queue;
+pub mod refine;
 pub mod scene;
 pub mod simplify;
 pub mod view;
