@@ -85,7 +85,8 @@ impl Criterion {
         }
         let a = dx * view.direction.x + dy * view.direction.y + dz * view.direction.z;
         let p2 = (d2 - a * a).max(0.0);
-        let behind_apex = a < 0.0 && p2 * (view.sin_beta * view.sin_beta) < a * a * (view.cos_beta * view.cos_beta);
+        let behind_apex =
+            a < 0.0 && p2 * (view.sin_beta * view.sin_beta) < a * a * (view.cos_beta * view.cos_beta);
         if behind_apex {
             return d2 <= r * r;
         }

@@ -300,7 +300,9 @@ impl<T: VertexTree, M: MeshSink> Engine<T, M> {
             Budget::FrameTime(_) if self.steering.limits() => Limit::Time,
             _ => Limit::Error,
         };
-        self.steering.observe(triangles, select + std::mem::take(&mut self.drawing_time));
+        let moved = self.before.len() != self.views.len()
+            || self.before.iter().zip(&self.views).any(|(b, v)| b.eye != v.eye || b.direction != v.direction);
+        self.steering.observe(triangles, select + std::mem::take(&mut self.drawing_time), moved);
         Ok(FrameReport {
             select,
             apply,
@@ -397,7 +399,8 @@ impl<T: VertexTree, M: MeshSink> Steps<'_, T, M> {
                 continue;
             }
             let above = self.stack.len();
-            self.stack.extend(self.tree.parents(node).filter(|&p| !self.front.is_active(p)).map(Pending::needed));
+            self.stack
+                .extend(self.tree.parents(node).filter(|&p| !self.front.is_active(p)).map(Pending::needed));
             if self.stack.len() > above {
                 // A needed node below folded ones: its ancestors come first.
                 continue;

@@ -71,7 +71,8 @@ impl Odometer {
         for (b, a) in before.iter().zip(after) {
             let moved = a.eye.distance(b.eye);
             // acos of a dot product is 0 for slow pans, and the clock would stand still.
-            let turned = 2.0 * (a.direction - b.direction).length().atan2((a.direction + b.direction).length());
+            let turned =
+                2.0 * (a.direction - b.direction).length().atan2((a.direction + b.direction).length());
             let steered = (a.k - b.k).abs();
             for (amount, rate) in [(moved, speed.rho), (turned, speed.omega), (steered, speed.kappa)] {
                 if amount > 0.0 {

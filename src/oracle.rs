@@ -92,7 +92,10 @@ impl Oracle {
     }
 
     /// Compares an engine's front with the cut for the engine's own views: `None` if they agree.
-    pub fn compare<T: VertexTree, M: vertex_tree::MeshSink>(&mut self, engine: &Engine<T, M>) -> Option<Difference> {
+    pub fn compare<T: VertexTree, M: vertex_tree::MeshSink>(
+        &mut self,
+        engine: &Engine<T, M>,
+    ) -> Option<Difference> {
         self.cut(engine.settings().criterion, engine.views());
         if self.hash == engine.front().cut_hash() && self.count == engine.front().active_nodes() {
             return None;

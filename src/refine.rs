@@ -96,7 +96,14 @@ impl Finder {
     }
 
     /// A frame begins: the views have moved from `before` to `frame.views`. Appends what must flip.
-    pub fn find(&mut self, frame: &Frame, before: &[View], roots: &[NodeId], front: &Front, flips: &mut Flips) {
+    pub fn find(
+        &mut self,
+        frame: &Frame,
+        before: &[View],
+        roots: &[NodeId],
+        front: &Front,
+        flips: &mut Flips,
+    ) {
         match self {
             Self::TopDown(s) => s.find(frame, roots, front, flips),
             Self::Front(s) => s.find(frame, flips),

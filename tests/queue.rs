@@ -1,6 +1,7 @@
 //! The event queue against an ordered map, and the time bounds against random motion.
 
 use std::collections::BTreeMap;
+use std::collections::btree_map::Entry;
 
 use foldfront::criterion::Criterion;
 use foldfront::motion::{Motion, Odometer, Speed};
@@ -53,16 +54,16 @@ proptest! {
             let mut due = Vec::new();
             match operation {
                 Operation::Schedule { node, frames } => {
-                    if !model.contains_key(&node) {
+                    if let Entry::Vacant(entry) = model.entry(node) {
                         queue.schedule(now, frames, NodeId(node), Kind::Unfold, BOUNDS);
-                        model.insert(node, Some((now, now + frames)));
+                        entry.insert(Some((now, now + frames)));
                     }
                     continue;
                 }
                 Operation::Press { node } => {
-                    if !model.contains_key(&node) {
+                    if let Entry::Vacant(entry) = model.entry(node) {
                         queue.press(NodeId(node), Kind::Unfold, BOUNDS);
-                        model.insert(node, None);
+                        entry.insert(None);
                     }
                     continue;
                 }

@@ -61,7 +61,8 @@ impl Hierarchy {
 
         // Numbers, from the roots down: a subtree of m leaves has m - 1 nodes.
         let mut number = vec![0_u32; count];
-        let mut nodes = vec![Node { first: 0, pivot: 0, end: 0, parent: NONE, triangles: 0, log_number: 0 }; count];
+        let mut nodes =
+            vec![Node { first: 0, pivot: 0, end: 0, parent: NONE, triangles: 0, log_number: 0 }; count];
         let mut bounds = vec![Bounds { center: [0.0; 3], radius: 0.0, eps: 0.0 }; count];
         let mut input_vertex = vec![0_u32; vertices];
         let mut roots = Vec::new();
@@ -180,8 +181,11 @@ impl Hierarchy {
             return NONE;
         }
         // Of lca(a, b) and lca(b, c), one lies below or at the other, if both exist: the one with fewer leaves.
-        let span = |n: u32| if n == NONE { u32::MAX } else { self.nodes[n as usize].end - self.nodes[n as usize].first };
-        let (ab, bc) = (self.lowest_common_ancestor(a, b, above_leaf), self.lowest_common_ancestor(b, c, above_leaf));
+        let span = |n: u32| {
+            if n == NONE { u32::MAX } else { self.nodes[n as usize].end - self.nodes[n as usize].first }
+        };
+        let (ab, bc) =
+            (self.lowest_common_ancestor(a, b, above_leaf), self.lowest_common_ancestor(b, c, above_leaf));
         if span(ab) <= span(bc) { ab } else { bc }
     }
 
@@ -191,6 +195,12 @@ impl Hierarchy {
             n = self.nodes[n as usize].parent;
         }
         n
+    }
+
+    /// Number in the collapse log of a node of this backend.
+    #[must_use]
+    pub fn log_number(&self, node: NodeId) -> u32 {
+        self.nodes[node.index()].log_number
     }
 
     /// Input vertex that a [`VertexId`](vertex_tree::VertexId) of this backend stands for.
