@@ -11,6 +11,7 @@ pub mod oracle;
 pub mod path;
 pub mod queue;
 pub mod refine;
+pub mod progress;
 pub mod scene;
 pub mod simplify;
 pub mod view;
