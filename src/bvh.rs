@@ -77,8 +77,7 @@ impl Bvh {
         Self { nodes, corners, triangles }
     }
 
-    /// The point of the soup nearest to `point`, if it is at most `within` away. A small `within` saves time: the
-    /// distance to any point of the soup will do, such as the answer for a neighbour of `point`.
+    /// The point of the soup nearest to `point`, if it is at most `within` away; nothing further away is looked at.
     #[must_use]
     pub fn nearest(&self, point: DVec3, within: f64) -> Option<Nearest> {
         let mut best_squared = within * within;
@@ -128,15 +127,6 @@ impl Bvh {
             triangle: self.triangles[slot],
             point,
         })
-    }
-
-    /// As [`Self::nearest`] without a limit, faster where `hint` is the answer for a point close by. `None` only if
-    /// there are no triangles.
-    #[must_use]
-    pub fn nearest_from(&self, point: DVec3, hint: Option<Nearest>) -> Option<Nearest> {
-        // The hint lies on its triangle but for rounding, so its distance can be a little too small.
-        hint.and_then(|hint| self.nearest(point, hint.point.distance(point)))
-            .or_else(|| self.nearest(point, f64::INFINITY))
     }
 }
 
@@ -414,7 +404,6 @@ mod tests {
     fn an_empty_soup_has_no_nearest_point() {
         let bvh = Bvh::new(&Mesh::default());
         assert_eq!(bvh.nearest(DVec3::ZERO, f64::INFINITY), None);
-        assert_eq!(bvh.nearest_from(DVec3::ZERO, None), None);
     }
 
     #[test]
@@ -454,19 +443,15 @@ mod tests {
         let bvh = Bvh::new(mesh);
         let corners =
             |t: usize| mesh.triangles[t].map(|v| DVec3::from(mesh.positions[v as usize].map(f64::from)));
-        let mut hint = None;
         for query in queries {
             let p = DVec3::from(query.map(f64::from));
             let brute = (0..mesh.triangles.len())
                 .map(|t| distance_by_projection(p, corners(t)))
                 .fold(f64::INFINITY, f64::min);
             let found = bvh.nearest(p, f64::INFINITY).unwrap();
-            let hinted = bvh.nearest_from(p, hint).unwrap();
             prop_assert!((found.distance - brute).abs() <= 1e-9, "{} but {brute}", found.distance);
-            prop_assert!((hinted.distance - brute).abs() <= 1e-9, "{} but {brute}", hinted.distance);
             let own = distance_by_projection(found.point, corners(found.triangle as usize));
             prop_assert!(own <= 1e-9, "the point is {own} off its triangle");
-            hint = Some(hinted);
         }
         Ok(())
     }
