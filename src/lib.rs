@@ -3,10 +3,6 @@
 pub mod active_mesh;
 pub mod budget;
 pub mod bvh;
-#[cfg(feature = "cli")]
-pub mod cli;
-#[cfg(feature = "cli")]
-pub mod compare;
 pub mod criterion;
 pub mod cut;
 pub mod deviation;
