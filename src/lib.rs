@@ -2,6 +2,7 @@
 
 pub mod mesh_io;
 pub mod path;
+pub mod progress;
 pub mod scene;
 pub mod simplify;
 pub mod view;
