@@ -13,9 +13,9 @@
 
 mod alps;
 mod building;
-mod city;
+pub(crate) mod city;
 mod height_field;
-mod laserscan;
+pub(crate) mod laserscan;
 mod layout;
 pub(crate) mod noise;
 
@@ -126,6 +126,12 @@ impl Scene {
     #[must_use]
     pub fn scale(&self) -> u32 {
         self.scale
+    }
+
+    /// Whether the scene is made of many separate objects, of which a view from afar shows only lumps.
+    #[must_use]
+    pub fn is_many_objects(&self) -> bool {
+        self.kind == SceneKind::City
     }
 
     /// Makes the mesh.

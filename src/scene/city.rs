@@ -5,7 +5,8 @@ use vertex_tree::Mesh;
 
 use super::building::{Building, Roof};
 use super::height_field::HeightField;
-use super::layout::{District, Layout, MainStreet, Town, Use, warp};
+pub(crate) use super::layout::MainStreet;
+use super::layout::{District, Layout, Town, Use, warp};
 use super::noise::{fractal, smooth_step};
 use crate::progress::Progress;
 

@@ -125,7 +125,6 @@ fn town() -> Town<'static> {
 }
 
 /// Where a point of the straight plan lies in the town.
-#[allow(dead_code)]
 pub(crate) fn place(p: DVec2) -> DVec2 {
     town().warp(p)
 }
