@@ -1,8 +1,26 @@
 //! Event-driven view-dependent level of detail.
 
+pub mod active_mesh;
+pub mod budget;
+pub mod bvh;
+pub mod criterion;
+pub mod cut;
+pub mod deviation;
+pub mod engine;
+pub mod front;
+mod frustum;
 pub mod mesh_io;
+pub mod motion;
+pub mod oracle;
+pub mod output;
+mod parallel;
 pub mod path;
+#[cfg(feature = "cli")]
+pub mod plot;
 pub mod progress;
+pub mod queue;
+pub mod refine;
+pub mod render;
 pub mod scene;
 pub mod simplify;
 pub mod view;

@@ -1,1 +1,22 @@
 //! The reference backend: the whole hierarchy resident, nothing clever.
+//!
+//! ```
+//! # use vertex_tree::{CollapseLog, NullSink, VertexTree};
+//! # use in_memory::{Hierarchy, InMemoryTree};
+//! # use std::sync::Arc;
+//! # fn main() -> Result<(), Box<dyn std::error::Error>> {
+//! # let log = CollapseLog::default();
+//! let hierarchy = Arc::new(Hierarchy::new(&log)?); // once a model
+//! let mut tree = InMemoryTree::new(hierarchy); // once a viewer
+//! tree.base_mesh(&mut NullSink)?;
+//! # Ok(())
+//! # }
+//! ```
+
+mod hierarchy;
+mod leaf_set;
+mod live;
+mod tree;
+
+pub use hierarchy::Hierarchy;
+pub use tree::InMemoryTree;

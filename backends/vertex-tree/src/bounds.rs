@@ -6,7 +6,7 @@
 /// must be folded before this one can be: a node whose sphere is out of view has nothing in view below it. `eps`
 /// estimates how far the input surface under the node lies from the surface shown while the node is folded; it is
 /// never less than that of a node that must be folded first.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Copy, Debug, PartialEq, bytemuck::Pod, bytemuck::Zeroable)]
 #[repr(C)]
 pub struct Bounds {
     /// Centre of the sphere.

@@ -97,6 +97,8 @@ pub trait VertexTree {
     fn vertex_count(&self) -> u32;
     /// One more than the largest [`TriangleId`](crate::TriangleId).
     fn triangle_count(&self) -> u32;
+    /// How many triangles are displayed now; known also where the sink does not keep the mesh.
+    fn displayed_triangles(&self) -> u64;
     /// The inner nodes that have no structural parent.
     fn roots(&self) -> &[NodeId];
     /// Sphere and error of a node, as stored: strategies and the brute-force oracle read the same.

@@ -1,0 +1,97 @@
+//! A set of leaf numbers that answers "the largest member that is not above x" in a few words.
+
+/// A set of numbers below a fixed limit: a tree of 64-way bit masks.
+///
+/// The front's vertices are kept in one: numbered depth-first, the vertex that stands for a leaf is the nearest one
+/// at or below it.
+#[derive(Clone, Debug)]
+pub struct LeafSet {
+    /// `levels[0]` has a bit a number; bit `i` of `levels[l + 1]` says whether word `i` of `levels[l]` is not 0.
+    levels: Vec<Vec<u64>>,
+}
+
+impl LeafSet {
+    pub fn new(limit: usize) -> Self {
+        let mut levels = Vec::new();
+        let mut words = limit;
+        loop {
+            words = words.div_ceil(64).max(1);
+            levels.push(vec![0; words]);
+            if words == 1 {
+                return Self { levels };
+            }
+        }
+    }
+
+    pub fn insert(&mut self, number: u32) {
+        let mut at = number as usize;
+        for level in &mut self.levels {
+            let word = &mut level[at / 64];
+            let was = *word;
+            *word |= 1 << (at % 64);
+            if was != 0 {
+                break;
+            }
+            at /= 64;
+        }
+    }
+
+    pub fn remove(&mut self, number: u32) {
+        let mut at = number as usize;
+        for level in &mut self.levels {
+            let word = &mut level[at / 64];
+            *word &= !(1 << (at % 64));
+            if *word != 0 {
+                break;
+            }
+            at /= 64;
+        }
+    }
+
+    /// The largest member that is not above `number`, if there is one.
+    pub fn at_or_below(&self, number: u32) -> Option<u32> {
+        let mut at = number as usize;
+        for (l, level) in self.levels.iter().enumerate() {
+            // On the lowest level `at` itself counts; above, only words below the one already searched do.
+            let mask = if l == 0 { u64::MAX >> (63 - at % 64) } else { (1 << (at % 64)) - 1 };
+            let word = level[at / 64] & mask;
+            if word != 0 {
+                let mut found = at / 64 * 64 + 63 - word.leading_zeros() as usize;
+                for below in self.levels[..l].iter().rev() {
+                    found = found * 64 + 63 - below[found].leading_zeros() as usize;
+                }
+                return Some(found as u32);
+            }
+            at /= 64;
+        }
+        None
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use std::collections::BTreeSet;
+
+    #[test]
+    fn agrees_with_an_ordered_set() {
+        for limit in [1, 63, 64, 65, 4096, 4097, 300_000] {
+            let mut set = LeafSet::new(limit);
+            let mut model = BTreeSet::new();
+            let mut state = 1_u64;
+            for _ in 0..3000 {
+                state = state.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
+                let number = ((state >> 33) % limit as u64) as u32;
+                if state >> 20 & 3 == 0 {
+                    set.remove(number);
+                    model.remove(&number);
+                } else {
+                    set.insert(number);
+                    model.insert(number);
+                }
+                let probe = ((state >> 13) % limit as u64) as u32;
+                assert_eq!(set.at_or_below(probe), model.range(..=probe).next_back().copied());
+            }
+        }
+    }
+}

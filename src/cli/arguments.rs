@@ -1,0 +1,328 @@
+//! The arguments of every command.
+
+use std::ops::Range;
+use std::path::PathBuf;
+use std::time::Duration;
+
+use clap::{Args, Parser, Subcommand, ValueEnum};
+
+use crate::criterion::Criterion;
+use crate::refine::Strategy;
+
+/// Event-driven view-dependent level of detail: build hierarchies, replay walkthroughs, compare strategies.
+#[derive(Debug, Parser)]
+#[command(name = "foldfront", version, about)]
+pub(super) struct Arguments {
+    #[command(subcommand)]
+    pub command: Command,
+}
+
+#[derive(Debug, Subcommand)]
+pub(super) enum Command {
+    /// Simplify a mesh into a hierarchy and write it to a file.
+    Build(Build),
+    /// Say what is in a hierarchy file.
+    Info(Info),
+    /// Check a hierarchy file wholly.
+    Verify(Verify),
+    /// Replay walkthroughs with every refinement strategy and write tables, curves and a report.
+    Compare(Compare),
+    /// Make, import and describe walkthrough paths.
+    Path(PathCommand),
+    /// Write the refined mesh of one frame.
+    Export(Export),
+    /// Draw the refined mesh of one frame.
+    Render(Render),
+    /// Measure how far the refined meshes of some frames are from the original.
+    Deviation(Deviation),
+}
+
+#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
+pub(super) enum Backend {
+    /// The whole hierarchy resident.
+    InMemory,
+}
+
+#[derive(Debug, Args)]
+pub(super) struct Build {
+    /// Mesh files (.obj .ply .stl .off), heights (.hgt, several are one mosaic; .png .tif), or scene:NAME.
+    #[arg(required = true)]
+    pub input: Vec<String>,
+    /// How the hierarchy will be stored.
+    #[arg(long, value_enum, default_value = "in-memory")]
+    pub backend: Backend,
+    /// The file to write.
+    #[arg(short, long)]
+    pub output: PathBuf,
+    /// Also merge near vertices of different components, so that many objects end in few roots.
+    #[arg(long)]
+    pub merge_components: bool,
+}
+
+#[derive(Debug, Args)]
+pub(super) struct Info {
+    /// What `build` wrote.
+    pub file: PathBuf,
+    /// Print JSON.
+    #[arg(long)]
+    pub json: bool,
+}
+
+#[derive(Debug, Args)]
+pub(super) struct Verify {
+    /// What `build` wrote.
+    pub file: PathBuf,
+}
+
+#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
+pub(super) enum CriterionName {
+    /// Projected geometric error.
+    Error,
+    /// Projected radius of the bounding sphere.
+    Sphere,
+}
+
+impl From<CriterionName> for Criterion {
+    fn from(name: CriterionName) -> Self {
+        match name {
+            CriterionName::Error => Self::ScreenError,
+            CriterionName::Sphere => Self::SphereSize,
+        }
+    }
+}
+
+/// When a node is refined.
+#[derive(Debug, Args)]
+pub(super) struct Refinement {
+    /// What is compared with the tolerance.
+    #[arg(long, value_enum, default_value = "error")]
+    pub criterion: CriterionName,
+    /// Tolerance as a share of half the image's height.
+    #[arg(long, value_parser = positive, conflicts_with = "pixels")]
+    pub theta: Option<f64>,
+    /// Tolerance in pixels of an image of 1080 lines [default: 1].
+    #[arg(long, value_parser = positive)]
+    pub pixels: Option<f64>,
+}
+
+/// Lines of the image that pixels are counted on.
+pub(super) const LINES: u32 = 1080;
+
+impl Refinement {
+    pub fn theta(&self) -> f64 {
+        self.theta.unwrap_or_else(|| crate::view::theta_of_pixels(self.pixels.unwrap_or(1.0), LINES))
+    }
+}
+
+#[derive(Debug, Args)]
+pub(super) struct Compare {
+    /// Meshes, hierarchy files and scene:NAME; by default the three built-in scenes. Tiles (.hgt) are one mosaic.
+    pub input: Vec<String>,
+    /// Walkthroughs to replay; by default those recorded for a built-in scene, and a flight around anything else.
+    #[arg(long)]
+    pub path: Vec<PathBuf>,
+    /// Replay only these frames.
+    #[arg(long, value_name = "A..B", value_parser = frames)]
+    pub frames: Option<Range<usize>>,
+    /// top-down, front, event, event-published; by default all.
+    #[arg(long, value_delimiter = ',', value_name = "LIST", value_parser = strategy)]
+    pub strategy: Vec<Strategy>,
+    /// Where hierarchies are kept.
+    #[arg(long, value_delimiter = ',', value_name = "LIST", value_enum)]
+    pub backend: Vec<Backend>,
+    #[command(flatten)]
+    pub refinement: Refinement,
+    /// Steer the tolerance so that no more triangles are displayed.
+    #[arg(long, value_name = "N", conflicts_with_all = ["frame_time", "theta", "pixels"])]
+    pub triangles: Option<u64>,
+    /// Steer the tolerance so that a refinement step takes no longer, such as 5ms.
+    #[arg(long, value_name = "TIME", value_parser = duration, conflicts_with_all = ["theta", "pixels"])]
+    pub frame_time: Option<Duration>,
+    /// Full speed of the eye in object units a frame; by default the path's 99th percentile.
+    #[arg(long, value_parser = positive)]
+    pub rho: Option<f64>,
+    /// Full speed of turning in radians a frame; by default the path's 99th percentile.
+    #[arg(long, value_parser = positive)]
+    pub omega: Option<f64>,
+    /// Compare every frame's cut with that of the other strategies and with the brute-force oracle.
+    #[arg(long)]
+    pub check: bool,
+    /// Folder for the results.
+    #[arg(long, default_value = "compare-out")]
+    pub out: PathBuf,
+}
+
+#[derive(Debug, Args)]
+pub(super) struct PathCommand {
+    #[command(subcommand)]
+    pub command: PathSubcommand,
+}
+
+#[derive(Debug, Subcommand)]
+pub(super) enum PathSubcommand {
+    /// Make the recorded walkthroughs of the built-in scenes again.
+    Generate {
+        /// scene:city, scene:alps, scene:laserscan; by default all.
+        scenes: Vec<String>,
+        /// Folder to write to.
+        #[arg(short, long, default_value = "paths")]
+        output: PathBuf,
+    },
+    /// Describe paths.
+    Info {
+        /// Path files.
+        #[arg(required = true)]
+        files: Vec<PathBuf>,
+    },
+    /// Bring a recorded trajectory to a mesh: scaled, placed, oriented and resampled.
+    Import {
+        /// TUM, KITTI (converted), Hoppe .frames, or positions only.
+        trajectory: PathBuf,
+        /// The mesh or scene or hierarchy that the path is for.
+        #[arg(long, required = true, num_args = 1..)]
+        fit: Vec<String>,
+        /// The path file to write.
+        #[arg(short, long)]
+        output: PathBuf,
+        /// How the trajectory is placed.
+        #[arg(long, value_enum, default_value = "fly")]
+        mode: ImportMode,
+        /// Frames a second.
+        #[arg(long, default_value = "60", value_parser = positive)]
+        rate: f64,
+    },
+}
+
+#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
+pub(super) enum ImportMode {
+    /// Over and around the mesh, clear of its surface.
+    Fly,
+    /// At eye height above the ground.
+    Walk,
+    /// Around the mesh, looking at it.
+    Orbit,
+}
+
+/// One frame of a walkthrough of something.
+#[derive(Debug, Args)]
+pub(super) struct FrameOf {
+    /// A hierarchy file, a mesh, or scene:NAME.
+    #[arg(required = true)]
+    pub file: Vec<String>,
+    /// The walkthrough.
+    #[arg(long)]
+    pub path: PathBuf,
+    /// Number of the frame, from 0.
+    #[arg(long)]
+    pub frame: usize,
+    #[command(flatten)]
+    pub refinement: Refinement,
+}
+
+#[derive(Debug, Args)]
+pub(super) struct Export {
+    #[command(flatten)]
+    pub frame: FrameOf,
+    /// The .ply file to write.
+    #[arg(short, long)]
+    pub output: PathBuf,
+}
+
+#[derive(Debug, Args)]
+pub(super) struct Render {
+    #[command(flatten)]
+    pub frame: FrameOf,
+    /// The .png file to write.
+    #[arg(short, long)]
+    pub output: PathBuf,
+    /// Look from outside, with the frustum drawn.
+    #[arg(long)]
+    pub outside: bool,
+    /// Draw the edges of the triangles too.
+    #[arg(long)]
+    pub wire: bool,
+    /// Width of the picture in pixels.
+    #[arg(long, default_value = "1280", value_parser = clap::value_parser!(u32).range(16..=8192))]
+    pub width: u32,
+}
+
+#[derive(Debug, Args)]
+pub(super) struct Deviation {
+    /// A hierarchy file, a mesh, or scene:NAME.
+    #[arg(required = true)]
+    pub file: Vec<String>,
+    /// The original to measure against; by default the input that the hierarchy holds.
+    #[arg(long)]
+    pub against: Vec<String>,
+    /// The walkthrough.
+    #[arg(long)]
+    pub path: PathBuf,
+    /// Numbers of the frames, from 0.
+    #[arg(long, value_delimiter = ',', required = true)]
+    pub frames: Vec<usize>,
+    /// Print JSON.
+    #[arg(long)]
+    pub json: bool,
+    #[command(flatten)]
+    pub refinement: Refinement,
+}
+
+fn positive(text: &str) -> Result<f64, String> {
+    match text.parse::<f64>() {
+        Ok(x) if x > 0.0 && x.is_finite() => Ok(x),
+        _ => Err("a number above 0 is expected".to_owned()),
+    }
+}
+
+fn strategy(text: &str) -> Result<Strategy, String> {
+    Strategy::ALL.into_iter().find(|s| s.name() == text).ok_or_else(|| {
+        format!("one of {} is expected", Strategy::ALL.map(Strategy::name).join(", "))
+    })
+}
+
+/// `A..B`, either of which may be missing.
+fn frames(text: &str) -> Result<Range<usize>, String> {
+    let expected = || "frames A..B with A less than B are expected".to_owned();
+    let (a, b) = text.split_once("..").ok_or_else(expected)?;
+    let bound = |text: &str, default| if text.is_empty() { Ok(default) } else { text.parse() };
+    let range = bound(a, 0).map_err(|_| expected())?..bound(b, usize::MAX).map_err(|_| expected())?;
+    if range.is_empty() { Err(expected()) } else { Ok(range) }
+}
+
+/// A number with the unit s, ms or us.
+fn duration(text: &str) -> Result<Duration, String> {
+    let expected = || "a time such as 5ms, 0.01s or 500us is expected".to_owned();
+    let (number, scale) = [("ms", 1e-3), ("us", 1e-6), ("s", 1.0)]
+        .iter()
+        .find_map(|&(unit, scale)| Some((text.strip_suffix(unit)?, scale)))
+        .ok_or_else(expected)?;
+    match number.parse::<f64>() {
+        Ok(x) if x > 0.0 && x < 1e9 => Ok(Duration::from_secs_f64(x * scale)),
+        _ => Err(expected()),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use clap::CommandFactory;
+
+    #[test]
+    fn arguments_are_consistent() {
+        Arguments::command().debug_assert();
+    }
+
+    #[test]
+    fn values_are_read_as_documented() {
+        assert_eq!(frames("3..7"), Ok(3..7));
+        assert_eq!(frames("..7"), Ok(0..7));
+        assert!(frames("7..3").is_err());
+        assert!(frames("3").is_err());
+        assert_eq!(duration("5ms"), Ok(Duration::from_millis(5)));
+        assert_eq!(duration("0.5s"), Ok(Duration::from_millis(500)));
+        assert!(duration("5").is_err());
+        assert!(positive("NaN").is_err());
+        assert_eq!(strategy("event"), Ok(Strategy::Event));
+        assert!(strategy("best").is_err());
+    }
+}

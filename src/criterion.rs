@@ -1,0 +1,177 @@
+//! The refinement criterion: one canonical predicate that decides every flip, and its time bounds.
+//!
+//! Zach & Karner, Fast Event-Driven Refinement of Dynamic Levels of Detail, 2003, section 3:
+//!
+//! ```text
+//! unfold(node) = inside or (visible and coarse)
+//! ```
+//!
+//! For a view with eye `e`, direction `v` and cone half-angle `beta`, and a node with sphere `(c, r)` and error
+//! `eps`, let `D = c - e`, `d = |D|`, `a = D.v`, `p = sqrt(d^2 - a^2)`. Then
+//!
+//! * inside: `d < r`;
+//! * coarse: `d <= R`, where `R = r + eps k` (screen error: the projection of `eps`, at the sphere's nearest point,
+//!   is at least the tolerance) or `R = r k` (sphere size, the paper's: that of `r`, at the centre);
+//! * visible: the sphere touches the cone. In the plane of `c` and the axis, the cone's edge is the ray
+//!   `(cos beta, sin beta)` in coordinates `(a, p)`; the signed distance of the centre from its line is
+//!   `f = p cos beta - a sin beta`, negative within. Visible iff `f <= r`. Where the foot of the perpendicular falls
+//!   behind the apex, `a cos beta + p sin beta < 0`, the apex is the nearest point of the cone and `f` is `d`.
+//!   This is the paper's `alpha - phi <= beta`, without trigonometry.
+//!
+//! Every test grows with the sphere and the error: if a node passes, so does any node whose sphere contains its
+//! sphere and whose error is no less. Stored bounds leave more slack between parent and child than f64 can lose.
+//!
+//! The predicate below squares `d <= R` and `f <= r` away: it needs no root, and since IEEE 754 fixes the result of
+//! every operation in it, all strategies, the oracle and every machine agree bit for bit.
+
+use vertex_tree::Bounds;
+
+use crate::motion::Speed;
+use crate::view::View;
+
+/// What "coarse" means: the second half of the refinement criterion.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Default)]
+pub enum Criterion {
+    /// The node's geometric error, seen from the eye at the nearest point of its sphere, exceeds the tolerance.
+    #[default]
+    ScreenError,
+    /// The radius of the node's sphere, seen at its centre, exceeds the tolerance (Zach & Karner).
+    SphereSize,
+}
+
+/// Shares of a numerator that a time bound gives up, so that rounding never makes it late.
+const SLACK: f64 = 1e-9;
+
+impl Criterion {
+    /// Within which distance of the centre the node is coarse, as `(R, dR/dk)`.
+    #[inline(always)]
+    fn reach(self, bounds: &Bounds, k: f64) -> (f64, f64) {
+        let (r, eps) = (f64::from(bounds.radius), f64::from(bounds.eps));
+        match self {
+            Self::ScreenError => (r + eps * k, eps),
+            Self::SphereSize => (r * k, r),
+        }
+    }
+
+    /// Within which distance of the centre the node is coarse, in object units.
+    #[must_use]
+    pub fn reach_distance(self, bounds: &Bounds, k: f64) -> f64 {
+        self.reach(bounds, k).0
+    }
+
+    /// Whether any of the views wants the node unfolded: the canonical predicate.
+    #[inline]
+    #[must_use]
+    pub fn unfold(self, views: &[View], bounds: &Bounds) -> bool {
+        views.iter().any(|view| self.unfold_for(view, bounds))
+    }
+
+    /// Whether one view wants the node unfolded.
+    #[inline(always)]
+    #[must_use]
+    pub fn unfold_for(self, view: &View, bounds: &Bounds) -> bool {
+        let dx = f64::from(bounds.center[0]) - view.eye.x;
+        let dy = f64::from(bounds.center[1]) - view.eye.y;
+        let dz = f64::from(bounds.center[2]) - view.eye.z;
+        let r = f64::from(bounds.radius);
+        let d2 = dx * dx + dy * dy + dz * dz;
+        let (reach, _) = self.reach(bounds, view.k);
+        // R >= r, so a node that is not coarse is not inside either.
+        if d2 > reach * reach {
+            return false;
+        }
+        if d2 < r * r {
+            return true;
+        }
+        let a = dx * view.direction.x + dy * view.direction.y + dz * view.direction.z;
+        let p2 = (d2 - a * a).max(0.0);
+        let behind_apex =
+            a < 0.0 && p2 * (view.sin_beta * view.sin_beta) < a * a * (view.cos_beta * view.cos_beta);
+        if behind_apex {
+            return d2 <= r * r;
+        }
+        // f <= r, with the root on one side: p cos beta <= r + a sin beta.
+        let bound = r + a * view.sin_beta;
+        bound >= 0.0 && p2 * (view.cos_beta * view.cos_beta) <= bound * bound
+    }
+
+    /// For a folded node, how many frames at full speed must pass before any view can want it unfolded; 0 if that
+    /// can not be said. Never late.
+    ///
+    /// In one frame at full speed the eye moves by at most `rho`, the direction turns by at most `omega` and `k`
+    /// changes by at most `kappa`. `f`, the signed distance from a convex cone, is 1-Lipschitz in the eye's
+    /// position. Turning the cone about the eye by `delta` is turning the centre about it, which moves it by at most
+    /// `d delta`. Any motion ends where a turn at the old eye followed by a translation ends, so after `t` frames
+    /// `f` has shrunk by at most `t (rho + omega d)`, with today's `d`. In the same time `d - R` has shrunk by at
+    /// most `t (rho + kappa dR/dk)`. Unfolding needs both to reach their marks: the later one counts. Entering the
+    /// sphere (the paper's `t_i`) is implied, as it means being visible, and `R >= r`.
+    #[inline]
+    #[must_use]
+    pub fn earliest_unfold(self, views: &[View], speed: &Speed, bounds: &Bounds) -> f64 {
+        views.iter().map(|view| self.earliest_unfold_for(view, speed, bounds)).fold(f64::INFINITY, f64::min)
+    }
+
+    #[inline(always)]
+    fn earliest_unfold_for(self, view: &View, speed: &Speed, bounds: &Bounds) -> f64 {
+        let s = Situation::new(self, view, bounds);
+        let visible = speed.frames(s.gap - s.slack, speed.rho + speed.omega * s.d);
+        let coarse = speed.frames(s.d - s.reach - s.slack, speed.rho + speed.kappa * s.reach_slope);
+        visible.max(coarse)
+    }
+
+    /// For an active node, how many frames at full speed must pass before no view wants it unfolded any more; 0 if
+    /// that can not be said. Never late. The dual of [`earliest_unfold`](Self::earliest_unfold), which the paper
+    /// leaves to the reader: a view lets go when the eye is outside the sphere *and* the node is invisible *or* no
+    /// longer coarse, and the last view counts.
+    #[inline]
+    #[must_use]
+    pub fn earliest_fold(self, views: &[View], speed: &Speed, bounds: &Bounds) -> f64 {
+        views.iter().map(|view| self.earliest_fold_for(view, speed, bounds)).fold(0.0, f64::max)
+    }
+
+    #[inline(always)]
+    fn earliest_fold_for(self, view: &View, speed: &Speed, bounds: &Bounds) -> f64 {
+        let s = Situation::new(self, view, bounds);
+        let outside = speed.frames(s.r - s.d - s.slack, speed.rho);
+        let invisible = speed.frames(-s.gap - s.slack, speed.rho + speed.omega * s.d);
+        let fine = speed.frames(s.reach - s.d - s.slack, speed.rho + speed.kappa * s.reach_slope);
+        outside.max(invisible.min(fine))
+    }
+}
+
+/// Where a node stands in a view, in object units.
+struct Situation {
+    /// Distance of the centre from the eye.
+    d: f64,
+    /// Radius of the sphere.
+    r: f64,
+    /// `f - r`: how far the sphere is from the cone, negative where it reaches into it.
+    gap: f64,
+    /// Distance within which the node is coarse, and how fast that grows with `k`.
+    reach: f64,
+    reach_slope: f64,
+    /// More than rounding can have changed any of the differences above.
+    slack: f64,
+}
+
+impl Situation {
+    #[inline(always)]
+    fn new(criterion: Criterion, view: &View, bounds: &Bounds) -> Self {
+        let dx = f64::from(bounds.center[0]) - view.eye.x;
+        let dy = f64::from(bounds.center[1]) - view.eye.y;
+        let dz = f64::from(bounds.center[2]) - view.eye.z;
+        let r = f64::from(bounds.radius);
+        let d2 = dx * dx + dy * dy + dz * dz;
+        let d = d2.sqrt();
+        let a = dx * view.direction.x + dy * view.direction.y + dz * view.direction.z;
+        let p = (d2 - a * a).max(0.0).sqrt();
+        let f = if a * view.cos_beta + p * view.sin_beta < 0.0 {
+            d
+        } else {
+            p * view.cos_beta - a * view.sin_beta
+        };
+        let (reach, reach_slope) = criterion.reach(bounds, view.k);
+        // p near the axis is only good to sqrt(epsilon) d, but there f is far from both marks unless r is larger.
+        Self { d, r, gap: f - r, reach, reach_slope, slack: SLACK * (d + reach) }
+    }
+}

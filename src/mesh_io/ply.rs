@@ -1,0 +1,177 @@
+//! The Stanford polygon format: read in text and both binary forms, written in little-endian binary.
+//!
+//! Vertices are the properties `x y z` of the element `vertex`, faces the list `vertex_indices` or `vertex_index` of
+//! the element `face`, whatever their types and order; everything else is skipped.
+
+use std::fs::File;
+use std::io::{self, BufRead, BufWriter, Read, Write};
+use std::path::Path;
+
+use serde::Deserialize;
+use serde::de::MapAccess;
+use serde_ply::{DeserializeError, PlyFormat, PlyReader, RowVisitor};
+
+use super::input::Input;
+use super::polygon::Faces;
+use super::{MeshIoError, Place};
+use crate::Mesh;
+
+#[derive(Deserialize)]
+struct Vertex {
+    x: f32,
+    y: f32,
+    z: f32,
+}
+
+#[derive(Deserialize)]
+struct Face {
+    #[serde(alias = "vertex_index")]
+    vertex_indices: Vec<i64>,
+}
+
+#[derive(Deserialize)]
+struct Skipped {}
+
+/// What has been read, and how far.
+struct Contents {
+    positions: Vec<[f32; 3]>,
+    faces: Faces,
+    face_count: u64,
+    /// The first coordinate or index that no mesh can have.
+    wrong: Option<Wrong>,
+    /// The row being read, where it belongs to an element of interest.
+    place: Option<Place>,
+}
+
+enum Wrong {
+    Coordinate { vertex: u64, value: f64 },
+    Index { face: u64, index: i64 },
+}
+
+pub(super) fn read(mut input: Input<'_>) -> Result<Mesh, MeshIoError> {
+    let mut contents = Contents {
+        positions: Vec::new(),
+        faces: Faces::new(Place::Face),
+        face_count: 0,
+        wrong: None,
+        place: None,
+    };
+    // The library wants white space behind the last word of a text file. In a binary file it would be data.
+    let mut line_end = &b"\n"[..];
+    let outcome = contents.read_from((&mut input).chain(&mut line_end));
+    let file = || input.path.to_owned();
+    let place = contents.place.unwrap_or(Place::Byte(input.position));
+    match outcome {
+        Ok(PlyFormat::Ascii) => {}
+        Ok(_) if line_end.is_empty() => return Err(MeshIoError::Truncated { file: file(), place }),
+        Ok(_) => {}
+        Err(DeserializeError(error)) => return Err(input.io(place, error)),
+    }
+    match contents.wrong {
+        None => contents.faces.into_mesh(input.path, contents.positions, 0),
+        Some(Wrong::Coordinate { vertex, value }) => {
+            Err(MeshIoError::NotFinite { file: file(), place: Place::Vertex(vertex), value })
+        }
+        Some(Wrong::Index { face, index }) => {
+            let vertices = contents.positions.len();
+            Err(MeshIoError::IndexOutOfRange { file: file(), place: Place::Face(face), index, vertices })
+        }
+    }
+}
+
+impl Contents {
+    fn read_from(&mut self, reader: impl BufRead) -> Result<PlyFormat, DeserializeError> {
+        let mut reader = PlyReader::from_reader(reader)?;
+        let format = reader.header().format;
+        while let Some(element) = reader.current_element() {
+            if element.properties.is_empty() && element.count > 0 {
+                // Its rows would take no bytes, and reading them all could take forever.
+                let message = format!("element {} has no properties", element.name);
+                return Err(io::Error::new(io::ErrorKind::InvalidData, message).into());
+            }
+            match element.name.as_str() {
+                "vertex" => {
+                    self.place = Some(Place::Vertex(0));
+                    let rows = &mut RowVisitor::new(|vertex| self.push_vertex(&vertex));
+                    (&mut reader).next_value_seed(rows)?;
+                }
+                "face" => {
+                    self.place = Some(Place::Face(0));
+                    let rows = &mut RowVisitor::new(|face| self.push_face(&face));
+                    (&mut reader).next_value_seed(rows)?;
+                }
+                _ => (&mut reader).next_value_seed(&mut RowVisitor::new(|_: Skipped| {}))?,
+            }
+            self.place = None;
+        }
+        Ok(format)
+    }
+
+    fn push_vertex(&mut self, &Vertex { x, y, z }: &Vertex) {
+        let vertex = self.positions.len() as u64;
+        if let Some(value) = [x, y, z].into_iter().find(|c| !c.is_finite()) {
+            self.wrong.get_or_insert(Wrong::Coordinate { vertex, value: f64::from(value) });
+        }
+        self.positions.push([x, y, z]);
+        self.place = Some(Place::Vertex(vertex + 1));
+    }
+
+    fn push_face(&mut self, Face { vertex_indices }: &Face) {
+        let face = self.face_count;
+        for &index in vertex_indices {
+            match u32::try_from(index) {
+                Ok(vertex) => self.faces.push_corner(vertex),
+                Err(_) => drop(self.wrong.get_or_insert(Wrong::Index { face, index })),
+            }
+        }
+        self.faces.end_face(face);
+        self.face_count += 1;
+        self.place = Some(Place::Face(self.face_count));
+    }
+}
+
+/// Writes a mesh as binary PLY, with a colour (red, green, blue) for each vertex if there are any: to a temporary
+/// name beside `path`, synced, then renamed.
+///
+/// # Errors
+/// [`MeshIoError::Io`], and [`MeshIoError::ColourCount`] if there are more or fewer colours than vertices.
+pub fn write_ply(path: &Path, mesh: &Mesh, colours: Option<&[[u8; 3]]>) -> Result<(), MeshIoError> {
+    let vertices = mesh.positions.len();
+    if let Some(colours) = colours.map(<[_]>::len).filter(|&n| n != vertices) {
+        return Err(MeshIoError::ColourCount { file: path.to_owned(), colours, vertices });
+    }
+    let io = |source| MeshIoError::Io { file: path.to_owned(), source };
+    let folder = match path.parent() {
+        Some(p) if !p.as_os_str().is_empty() => p,
+        _ => Path::new("."),
+    };
+    let mut temporary = tempfile::Builder::new().prefix(".foldfront-").tempfile_in(folder).map_err(io)?;
+    write_to(temporary.as_file_mut(), mesh, colours).map_err(io)?;
+    temporary.as_file().sync_all().map_err(io)?;
+    temporary.persist(path).map_err(|e| io(e.error))?;
+    Ok(())
+}
+
+fn write_to(file: &mut File, mesh: &Mesh, colours: Option<&[[u8; 3]]>) -> io::Result<()> {
+    let mut out = BufWriter::with_capacity(1 << 20, file);
+    writeln!(out, "ply\nformat binary_little_endian 1.0\nelement vertex {}", mesh.positions.len())?;
+    writeln!(out, "property float x\nproperty float y\nproperty float z")?;
+    if colours.is_some() {
+        writeln!(out, "property uchar red\nproperty uchar green\nproperty uchar blue")?;
+    }
+    // Many readers know only `int` here; it serves as long as the numbers fit.
+    let index = if mesh.positions.len() <= i32::MAX as usize { "int" } else { "uint" };
+    writeln!(out, "element face {}", mesh.triangles.len())?;
+    writeln!(out, "property list uchar {index} vertex_indices\nend_header")?;
+    for (vertex, position) in mesh.positions.iter().enumerate() {
+        out.write_all(position.map(f32::to_le_bytes).as_flattened())?;
+        if let Some(colours) = colours {
+            out.write_all(&colours[vertex])?;
+        }
+    }
+    for triangle in &mesh.triangles {
+        out.write_all(&[3])?;
+        out.write_all(triangle.map(u32::to_le_bytes).as_flattened())?;
+    }
+    out.flush()
+}

@@ -1,0 +1,260 @@
+//! Polygons into triangles.
+//!
+//! A polygon is projected on its Newell plane (the normal is the sum of the cross products of consecutive corners,
+//! Sutherland, Sproull & Schumacker 1974). If the fan around its first corner turns the right way everywhere, as in
+//! every strictly convex polygon, it is taken; otherwise ears are clipped (the `earcut` crate). Every edge of a
+//! polygon becomes the edge of a triangle, so that neighbouring polygons still meet without a gap.
+
+use std::path::Path;
+
+use earcut::Earcut;
+use earcut::utils3d::project3d_to_2d;
+
+use super::{MAX_VERTICES, MeshIoError, Place};
+use crate::Mesh;
+
+/// Ear clipping is quadratic at worst.
+pub(super) const MAX_CORNERS: usize = 1 << 14;
+
+/// The faces of a file, collected before they are triangulated: a face may come before its vertices.
+pub(super) struct Faces {
+    corners: Vec<u32>,
+    /// For each face, its number in the file and the end of its corners in `corners`.
+    ends: Vec<(u64, usize)>,
+    place: fn(u64) -> Place,
+}
+
+impl Faces {
+    /// No faces yet; `place` makes the place of a face from its number.
+    pub fn new(place: fn(u64) -> Place) -> Self {
+        Self { corners: Vec::new(), ends: Vec::new(), place }
+    }
+
+    /// Adds a corner to the face that the next [`end_face`](Self::end_face) ends.
+    pub fn push_corner(&mut self, vertex: u32) {
+        self.corners.push(vertex);
+    }
+
+    pub fn end_face(&mut self, number: u64) {
+        self.ends.push((number, self.corners.len()));
+    }
+
+    /// Triangulates. `first` is the number of the first vertex in the file, for the error.
+    pub fn into_mesh(self, file: &Path, positions: Vec<[f32; 3]>, first: i64) -> Result<Mesh, MeshIoError> {
+        let vertices = positions.len();
+        if vertices > MAX_VERTICES {
+            return Err(MeshIoError::TooManyVertices { file: file.to_owned() });
+        }
+        let mut triangles = Vec::with_capacity(self.corners.len().saturating_sub(2 * self.ends.len()));
+        let mut triangulator = Triangulator::default();
+        let mut start = 0;
+        for (number, end) in self.ends {
+            let corners = &self.corners[start..end];
+            start = end;
+            let (file, place) = (|| file.to_owned(), (self.place)(number));
+            if corners.len() > MAX_CORNERS {
+                return Err(MeshIoError::TooManyCorners { file: file(), place, corners: corners.len() });
+            }
+            if let Some(&vertex) = corners.iter().find(|&&v| v as usize >= vertices) {
+                let index = i64::from(vertex) + first;
+                return Err(MeshIoError::IndexOutOfRange { file: file(), place, index, vertices });
+            }
+            triangulator.triangulate(corners, &positions, &mut triangles);
+        }
+        Ok(Mesh { positions, triangles })
+    }
+}
+
+/// Adds a triangle, unless it names a vertex twice and so has no surface.
+pub(super) fn push_triangle(triangles: &mut Vec<[u32; 3]>, [a, b, c]: [u32; 3]) {
+    if a != b && b != c && c != a {
+        triangles.push([a, b, c]);
+    }
+}
+
+/// The work space of the triangulation.
+#[derive(Default)]
+struct Triangulator {
+    earcut: Earcut<f64>,
+    ring: Vec<[f64; 3]>,
+    plane: Vec<[f64; 2]>,
+    ears: Vec<u32>,
+    clipped: Vec<bool>,
+}
+
+impl Triangulator {
+    fn triangulate(&mut self, corners: &[u32], positions: &[[f32; 3]], triangles: &mut Vec<[u32; 3]>) {
+        if let &[a, b, c] = corners {
+            return push_triangle(triangles, [a, b, c]);
+        }
+        if corners.len() < 3 {
+            return;
+        }
+        // Relative to the first corner, or a small face far from the origin would drown in rounding.
+        let origin = positions[corners[0] as usize].map(f64::from);
+        self.ring.clear();
+        self.ring.extend(corners.iter().map(|&v| {
+            let p = positions[v as usize].map(f64::from);
+            [p[0] - origin[0], p[1] - origin[1], p[2] - origin[2]]
+        }));
+        let flat = project3d_to_2d(&self.ring, self.ring.len(), &mut self.plane);
+        let mut push = |local: [usize; 3]| push_triangle(triangles, local.map(|i| corners[i]));
+        if flat && !self.fan_fits() && self.clip_ears() {
+            for ear in self.ears.chunks_exact(3) {
+                push([ear[0] as usize, ear[1] as usize, ear[2] as usize]);
+            }
+        } else {
+            // A polygon without area or one that crosses itself has no right triangulation; the fan keeps its edges.
+            for i in 1..corners.len() - 1 {
+                push([0, i, i + 1]);
+            }
+        }
+    }
+
+    /// Whether all triangles of the fan around corner 0 are counter-clockwise in the plane.
+    fn fan_fits(&self) -> bool {
+        (1..self.plane.len() - 1).all(|i| signed_area(self.plane[0], self.plane[i], self.plane[i + 1]) > 0.0)
+    }
+
+    /// Fills `ears` with counter-clockwise triangles; false if they can not be made to cover every corner.
+    fn clip_ears(&mut self) -> bool {
+        self.earcut.earcut(self.plane.iter().copied(), &[], &mut self.ears);
+        for ear in self.ears.chunks_exact_mut(3) {
+            let [a, b, c] = [ear[0], ear[1], ear[2]].map(|i| self.plane[i as usize]);
+            if signed_area(a, b, c) < 0.0 {
+                ear.swap(1, 2);
+            }
+        }
+        self.restore_corners();
+        self.ears.len() == 3 * (self.plane.len() - 2)
+    }
+
+    /// Puts back the corners that ear clipping left out because they lie on the line between their neighbours:
+    /// the triangle at the edge from p to q that a run of such corners d e lies on becomes a fan.
+    ///
+    /// ```text
+    ///      c              c
+    ///     / \            /|\
+    ///    /   \    =>    / | \      (shown with one corner d)
+    ///   p-----q        p--d--q
+    /// ```
+    fn restore_corners(&mut self) {
+        let count = self.plane.len();
+        self.clipped.clear();
+        self.clipped.resize(count, true);
+        for &corner in &self.ears {
+            self.clipped[corner as usize] = false;
+        }
+        for before in 0..count {
+            if self.clipped[before] || !self.clipped[(before + 1) % count] {
+                continue;
+            }
+            let run = (1..count).take_while(|i| self.clipped[(before + i) % count]).count();
+            let (p, q) = (before as u32, ((before + run + 1) % count) as u32);
+            let Some(at) = (0..self.ears.len()).find(|&i| {
+                let next = if i % 3 == 2 { i - 2 } else { i + 1 };
+                (self.ears[i], self.ears[next]) == (p, q)
+            }) else {
+                return;
+            };
+            let opposite = self.ears[at / 3 * 3 + (at + 2) % 3];
+            for step in 0..=run {
+                let edge = [before + step, before + step + 1].map(|i| (i % count) as u32);
+                let triangle = [edge[0], edge[1], opposite];
+                if step == 0 {
+                    self.ears[at / 3 * 3..][..3].copy_from_slice(&triangle);
+                } else {
+                    self.ears.extend(triangle);
+                }
+            }
+        }
+    }
+}
+
+/// Twice the area of a triangle, positive if it is counter-clockwise.
+fn signed_area(a: [f64; 2], b: [f64; 2], c: [f64; 2]) -> f64 {
+    (b[0] - a[0]) * (c[1] - a[1]) - (b[1] - a[1]) * (c[0] - a[0])
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Triangulates a polygon in the xy plane and returns the sum of the areas and of their absolute values.
+    fn areas(points: &[[f32; 2]]) -> (Vec<[u32; 3]>, f64, f64) {
+        let positions: Vec<_> = points.iter().map(|p| [p[0], p[1], 5.0]).collect();
+        let corners: Vec<_> = (0..points.len() as u32).collect();
+        let mut triangles = Vec::new();
+        Triangulator::default().triangulate(&corners, &positions, &mut triangles);
+        let area = |t: &[u32; 3]| {
+            let [a, b, c] = t.map(|v| points[v as usize].map(f64::from));
+            signed_area(a, b, c) / 2.0
+        };
+        let (sum, magnitude) =
+            (triangles.iter().map(area).sum(), triangles.iter().map(|t| area(t).abs()).sum());
+        (triangles, sum, magnitude)
+    }
+
+    #[test]
+    fn a_convex_polygon_becomes_a_fan() {
+        let (triangles, area, _) = areas(&[[0.0, 0.0], [2.0, 0.0], [2.0, 1.0], [0.0, 1.0]]);
+        assert_eq!(triangles, [[0, 1, 2], [0, 2, 3]]);
+        assert_eq!(area, 2.0);
+    }
+
+    /// An arrow head: the fan around a wing would leave the polygon.
+    ///
+    /// ```text
+    ///      ___--2
+    ///   3--   1
+    ///      ---__0
+    /// ```
+    #[test]
+    fn a_concave_polygon_keeps_its_area_and_winding() {
+        let arrow = [[4.0, 0.0], [1.0, 2.0], [4.0, 4.0], [0.0, 2.0]];
+        for turn in 0..4 {
+            let mut turned = arrow;
+            turned.rotate_left(turn);
+            let (triangles, area, magnitude) = areas(&turned);
+            assert_eq!((triangles.len(), area, magnitude), (2, 2.0, 2.0), "from corner {turn}");
+            turned.reverse();
+            let (_, area, magnitude) = areas(&turned);
+            assert_eq!((area, magnitude), (-2.0, 2.0), "reversed, from corner {turn}");
+        }
+    }
+
+    /// An L with further corners on three of its edges: ear clipping alone would drop these, and a neighbour that
+    /// uses them would be left with a gap.
+    #[test]
+    fn corners_on_a_straight_edge_are_kept() {
+        let mut l: Vec<[f32; 2]> = vec![
+            [0.0, 0.0],
+            [1.0, 0.0],
+            [2.0, 0.0],
+            [3.0, 0.0],
+            [3.0, 1.0],
+            [2.0, 1.0],
+            [1.0, 1.0],
+            [1.0, 3.0],
+        ];
+        l.extend([[0.0, 3.0], [0.0, 2.0], [0.0, 1.0]]);
+        for turn in 0..l.len() {
+            let mut turned = l.clone();
+            turned.rotate_left(turn);
+            let (triangles, area, magnitude) = areas(&turned);
+            assert_eq!((triangles.len(), area, magnitude), (l.len() - 2, 5.0, 5.0), "from corner {turn}");
+            for i in 0..l.len() as u32 {
+                let edge = [i, (i + 1) % l.len() as u32];
+                let sides = |t: &[u32; 3]| [[t[0], t[1]], [t[1], t[2]], [t[2], t[0]]].contains(&edge);
+                assert_eq!(triangles.iter().filter(|t| sides(t)).count(), 1, "edge {edge:?}");
+            }
+        }
+    }
+
+    #[test]
+    fn polygons_without_a_plane_do_not_disturb() {
+        assert_eq!(areas(&[[1.0, 1.0]; 5]).0.len(), 3);
+        assert_eq!(areas(&[[0.0, 0.0], [1.0, 1.0], [2.0, 2.0], [3.0, 3.0]]).1, 0.0);
+        assert_eq!(areas(&[[0.0, 0.0], [1.0, 1.0]]).0.len(), 0);
+    }
+}

@@ -1,0 +1,92 @@
+//! How fast the camera may move, and the clock that runs on distance travelled.
+
+use crate::view::View;
+
+/// Declared bounds on the camera's motion in one frame. They decide how far ahead events are scheduled, never
+/// whether the cut is right: a camera that exceeds them makes the clock run faster.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Speed {
+    /// Distance the eye moves in a frame at full speed, in object units.
+    pub rho: f64,
+    /// Angle the direction turns in a frame at full speed, in radians.
+    pub omega: f64,
+    /// Change of [`View::k`] in a frame at full speed; 0 where the tolerance is fixed.
+    pub kappa: f64,
+}
+
+impl Speed {
+    /// Frames until `distance` has been covered at `rate` a frame: 0 if there is nothing left to cover, infinite
+    /// if nothing moves.
+    #[inline(always)]
+    pub(crate) fn frames(&self, distance: f64, rate: f64) -> f64 {
+        if distance > 0.0 { distance / rate } else { 0.0 }
+    }
+}
+
+/// What happened to the views between two frames.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Motion {
+    /// Nothing moved.
+    Rest,
+    /// The views moved by so many frames at full speed.
+    Frames(f64),
+    /// The views can not be compared, or moved in a way that no declared speed covers: test everything.
+    Unbounded,
+}
+
+/// The odometer clock: its time is distance travelled, in frames at full speed.
+///
+/// A camera at rest stops it, a slow one lets it creep, and one that is faster than declared makes it run further:
+/// a node whose bound has not passed on this clock can not have changed its answer, whatever the camera did.
+#[derive(Clone, Copy, Debug, Default)]
+pub struct Odometer {
+    now: f64,
+}
+
+/// Increments are rounded up by more than the arithmetic that measures them can have lost.
+const ROUND_UP: f64 = 1.0 + 1e-12;
+
+impl Odometer {
+    /// The time: frames at full speed since the start.
+    #[must_use]
+    pub fn now(&self) -> f64 {
+        self.now
+    }
+
+    /// Advances by the motion from the views of the last frame to those of this one.
+    pub fn advance(&mut self, speed: &Speed, before: &[View], after: &[View]) -> Motion {
+        let motion = Self::motion(speed, before, after);
+        if let Motion::Frames(frames) = motion {
+            // Millions of small steps must not be rounded away either.
+            self.now = (self.now + frames).next_up();
+        }
+        motion
+    }
+
+    fn motion(speed: &Speed, before: &[View], after: &[View]) -> Motion {
+        if before.len() != after.len() || !before.iter().zip(after).all(|(b, a)| b.same_cone(a)) {
+            return Motion::Unbounded;
+        }
+        let mut frames = 0.0_f64;
+        for (b, a) in before.iter().zip(after) {
+            let moved = a.eye.distance(b.eye);
+            // acos of a dot product is 0 for slow pans, and the clock would stand still.
+            let turned =
+                2.0 * (a.direction - b.direction).length().atan2((a.direction + b.direction).length());
+            let steered = (a.k - b.k).abs();
+            for (amount, rate) in [(moved, speed.rho), (turned, speed.omega), (steered, speed.kappa)] {
+                if amount > 0.0 {
+                    frames = frames.max(amount / rate);
+                }
+            }
+        }
+        if frames == 0.0 && before == after {
+            Motion::Rest
+        } else if frames < 1e9 {
+            // A motion too small for its own arithmetic to see still ticks.
+            Motion::Frames((frames * ROUND_UP).max(f64::MIN_POSITIVE))
+        } else {
+            Motion::Unbounded
+        }
+    }
+}

@@ -1,0 +1,112 @@
+//! The brute-force cut: what every strategy must arrive at.
+//!
+//! Every node of the hierarchy is tested, nothing is remembered and no order is relied on. The cut is the closure
+//! upwards of the nodes that some view wants.
+
+use vertex_tree::{Bounds, CollapseLog, Forest, LogError, NONE, VertexTree};
+
+use crate::criterion::Criterion;
+use crate::engine::Engine;
+use crate::front::mix;
+use crate::view::View;
+
+/// Bounds and parents of all nodes, in the order of the collapse log.
+#[derive(Clone, Debug)]
+pub struct Oracle {
+    bounds: Vec<Bounds>,
+    parent: Vec<u32>,
+    active: Vec<bool>,
+    hash: u64,
+    count: usize,
+}
+
+/// A node whose status is not the oracle's.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Difference {
+    /// Number in the collapse log.
+    pub node: u32,
+    /// Sphere and error.
+    pub bounds: Bounds,
+    /// Whether the oracle has it active; the engine has the opposite.
+    pub active: bool,
+    /// How many nodes differ in all.
+    pub count: usize,
+}
+
+impl Oracle {
+    /// An oracle for a log.
+    ///
+    /// # Errors
+    /// What [`CollapseLog::forest`] finds wrong with the log.
+    pub fn new(log: &CollapseLog) -> Result<Self, LogError> {
+        Ok(Self::with_forest(log, log.forest()?))
+    }
+
+    /// An oracle for a log whose forest is known.
+    #[must_use]
+    pub fn with_forest(log: &CollapseLog, forest: Forest) -> Self {
+        Self {
+            bounds: log.collapses.iter().map(|c| c.bounds).collect(),
+            active: vec![false; forest.parent.len()],
+            parent: forest.parent,
+            hash: 0,
+            count: 0,
+        }
+    }
+
+    /// Finds the cut for these views.
+    pub fn cut(&mut self, criterion: Criterion, views: &[View]) -> &[bool] {
+        for (active, bounds) in self.active.iter_mut().zip(&self.bounds) {
+            *active = criterion.unfold(views, bounds);
+        }
+        // Children come before their parents in the log, so one pass closes upwards.
+        (self.hash, self.count) = (0, 0);
+        for n in 0..self.active.len() {
+            if self.active[n] {
+                self.hash = self.hash.wrapping_add(mix(n as u32));
+                self.count += 1;
+                if self.parent[n] != NONE {
+                    self.active[self.parent[n] as usize] = true;
+                }
+            }
+        }
+        &self.active
+    }
+
+    /// The active nodes of the last cut, by number in the collapse log.
+    #[must_use]
+    pub fn active(&self) -> &[bool] {
+        &self.active
+    }
+
+    /// Hash of the last cut, comparable with [`Front::cut_hash`](crate::front::Front::cut_hash).
+    #[must_use]
+    pub fn cut_hash(&self) -> u64 {
+        self.hash
+    }
+
+    /// Size of the last cut.
+    #[must_use]
+    pub fn active_nodes(&self) -> usize {
+        self.count
+    }
+
+    /// Compares an engine's front with the cut for the engine's own views: `None` if they agree.
+    pub fn compare<T: VertexTree, M: vertex_tree::MeshSink>(
+        &mut self,
+        engine: &Engine<T, M>,
+    ) -> Option<Difference> {
+        self.cut(engine.settings().criterion, engine.views());
+        if self.hash == engine.front().cut_hash() && self.count == engine.front().active_nodes() {
+            return None;
+        }
+        let mut differs = self.active.clone();
+        engine.for_each_active(|node| {
+            let n = engine.tree().log_number(node) as usize;
+            differs[n] = !differs[n];
+        });
+        let count = differs.iter().filter(|&&d| d).count();
+        let node = differs.iter().rposition(|&d| d)?;
+        Some(Difference { node: node as u32, bounds: self.bounds[node], active: self.active[node], count })
+    }
+}

@@ -1,0 +1,147 @@
+//! Refinement strategies: ways to find the nodes whose status must flip. All else is shared (see
+//! [`engine`](crate::engine)), and all must arrive at the same cut.
+
+pub mod event;
+pub mod front;
+pub mod published;
+pub mod top_down;
+
+use vertex_tree::{Bounds, NodeId};
+
+use crate::criterion::Criterion;
+use crate::front::Front;
+use crate::motion::{Motion, Speed};
+use crate::queue::Kind;
+use crate::view::View;
+
+/// How the nodes that must change are found.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+pub enum Strategy {
+    /// Walk all active and boundary nodes from the roots, every frame (Zach & Karner, Figure 3).
+    TopDown,
+    /// Scan all boundary and all collapsible nodes, every frame, in a packed array.
+    Front,
+    /// Test a node only when the camera could have changed the answer: an event queue on an odometer clock.
+    Event,
+    /// The event queue as published, with its time bounds, integer frames and lists of nodes. It misses flips: its
+    /// bounds are not conservative. For comparison.
+    EventPublished,
+}
+
+impl Strategy {
+    /// All of them, in the order of reports.
+    pub const ALL: [Self; 4] = [Self::TopDown, Self::Front, Self::Event, Self::EventPublished];
+
+    /// The name on the command line and in files.
+    #[must_use]
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::TopDown => "top-down",
+            Self::Front => "front",
+            Self::Event => "event",
+            Self::EventPublished => "event-published",
+        }
+    }
+
+    /// Whether its cut is the oracle's in every frame.
+    #[must_use]
+    pub fn is_exact(self) -> bool {
+        self != Self::EventPublished
+    }
+}
+
+/// What a strategy knows of the frame.
+pub(crate) struct Frame<'a> {
+    pub criterion: Criterion,
+    pub views: &'a [View],
+    pub speed: Speed,
+    /// Time on the odometer clock.
+    pub now: f64,
+    pub motion: Motion,
+}
+
+impl Frame<'_> {
+    #[inline]
+    pub fn unfold(&self, bounds: &Bounds) -> bool {
+        self.criterion.unfold(self.views, bounds)
+    }
+}
+
+/// Nodes whose status must flip: boundary nodes to unfold, collapsible nodes to fold.
+#[derive(Default)]
+pub(crate) struct Flips {
+    pub unfold: Vec<NodeId>,
+    pub fold: Vec<NodeId>,
+    /// Tests of the criterion made to find them.
+    pub tests: u64,
+}
+
+/// A strategy's state. The engine tells it of every node that becomes or ceases to be a boundary node or
+/// collapsible, so that it can watch just these.
+pub(crate) enum Finder {
+    TopDown(top_down::TopDown),
+    Front(front::FrontScan),
+    Event(event::EventDriven),
+    Published(published::Published),
+}
+
+impl Finder {
+    pub fn new(strategy: Strategy, node_limit: u32) -> Self {
+        match strategy {
+            Strategy::TopDown => Self::TopDown(top_down::TopDown::default()),
+            Strategy::Front => Self::Front(front::FrontScan::new(node_limit)),
+            Strategy::Event => Self::Event(event::EventDriven::new(node_limit)),
+            Strategy::EventPublished => Self::Published(published::Published::new(node_limit)),
+        }
+    }
+
+    /// A frame begins: the views have moved from `before` to `frame.views`. Appends what must flip.
+    pub fn find(
+        &mut self,
+        frame: &Frame,
+        before: &[View],
+        roots: &[NodeId],
+        front: &Front,
+        flips: &mut Flips,
+    ) {
+        match self {
+            Self::TopDown(s) => s.find(frame, roots, front, flips),
+            Self::Front(s) => s.find(frame, flips),
+            Self::Event(s) => s.find(frame, flips),
+            Self::Published(s) => s.find(frame, before, front, flips),
+        }
+    }
+
+    /// `node` has become a boundary node or collapsible; the criterion does not ask for it to change.
+    #[inline]
+    pub fn watch(&mut self, frame: &Frame, node: NodeId, kind: Kind, bounds: Bounds) {
+        match self {
+            Self::TopDown(_) => {}
+            Self::Front(s) => s.watch(node, kind, bounds),
+            Self::Event(s) => s.watch(frame, node, kind, bounds),
+            Self::Published(s) => s.watch(frame, node, kind, &bounds),
+        }
+    }
+
+    /// `node` is no longer what it was watched as, if it was watched.
+    #[inline]
+    pub fn unwatch(&mut self, node: NodeId) {
+        match self {
+            Self::TopDown(_) => {}
+            Self::Front(s) => s.unwatch(node),
+            Self::Event(s) => s.unwatch(node),
+            Self::Published(s) => s.unwatch(node),
+        }
+    }
+
+    /// `node` should have changed, but the backend refused for now: it must be found again in the next frame, even
+    /// if nothing moves.
+    pub fn refused(&mut self, frame: &Frame, node: NodeId, kind: Kind, bounds: Bounds) {
+        match self {
+            Self::TopDown(_) => {}
+            Self::Front(s) => s.watch(node, kind, bounds),
+            Self::Event(s) => s.refused(node, kind, bounds),
+            Self::Published(s) => s.refused(frame, node, kind),
+        }
+    }
+}

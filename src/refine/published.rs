@@ -1,0 +1,147 @@
+//! Event-driven refinement as published (Zach & Karner 2003, sections 3 and 4, Figures 4 to 7), for comparison.
+//!
+//! Kept as printed: integer frames, a circular buffer of lists of nodes, fixed `rho` and `omega`, a frame counter
+//! that skips ahead when the camera is faster. Three things had to be mended or chosen:
+//!
+//! * The printed `t_r = ceil((alpha + phi - sqrt(2) fov/2) / omega)` has a sign slip: the sphere's edge is seen at
+//!   `alpha - phi`. As printed the visibility of a sphere would be predicted too late by its whole angular size.
+//! * Figure 4 tests `r / tan(fov) / d`, the text `r / (tan(fov/2) d)`: the text's is used, and the cone that the
+//!   rest of this crate uses.
+//! * The dual formulation for folding is not printed. Here: outside the sphere after `(r - d) / rho` frames,
+//!   invisible after `(beta + phi - alpha) / omega`, too small after `(R - d) / rho`; the earliest fold is the
+//!   maximum of the first and of the minimum of the others.
+//!
+//! What remains is the published scheme's own error: moving the eye changes `alpha` and `phi` too, which `t_r`
+//! ignores, so nodes come into view or leave it before their event is due. A node is then wrong until it is.
+
+use glam::DVec3;
+use vertex_tree::{Bounds, NodeId};
+
+use super::{Flips, Frame};
+use crate::front::Front;
+use crate::queue::Kind;
+use crate::view::View;
+
+/// Frames that the circular buffer spans. Later events wait in its last list, and are inserted again from there.
+const HORIZON: u64 = 4096;
+
+#[derive(Clone, Copy)]
+struct Entry {
+    node: NodeId,
+    kind: Kind,
+    ticket: u32,
+}
+
+pub(crate) struct Published {
+    lists: Vec<Vec<Entry>>,
+    frame: u64,
+    tickets: Vec<u32>,
+    due: Vec<Entry>,
+}
+
+impl Published {
+    pub fn new(node_limit: u32) -> Self {
+        Self {
+            lists: vec![Vec::new(); HORIZON as usize],
+            frame: 0,
+            tickets: vec![0; node_limit as usize],
+            due: Vec::new(),
+        }
+    }
+
+    pub fn find(&mut self, frame: &Frame, before: &[View], front: &Front, flips: &mut Flips) {
+        let first = self.frame + 1;
+        self.frame += frames_passed(frame, before);
+        self.due.clear();
+        for at in first..=self.frame.min(first + HORIZON - 1) {
+            self.due.append(&mut self.lists[(at % HORIZON) as usize]);
+        }
+        let mut due = std::mem::take(&mut self.due);
+        due.retain(|e| self.tickets[e.node.index()] == e.ticket);
+        flips.tests += due.len() as u64;
+        for entry in &due {
+            let bounds = front.bounds(entry.node);
+            if frame.unfold(&bounds) == (entry.kind == Kind::Unfold) {
+                match entry.kind {
+                    Kind::Unfold => flips.unfold.push(entry.node),
+                    Kind::Fold => flips.fold.push(entry.node),
+                }
+            } else {
+                self.insert(frames_until(frame, entry.kind, &bounds), *entry);
+            }
+        }
+        self.due = due;
+    }
+
+    pub fn watch(&mut self, frame: &Frame, node: NodeId, kind: Kind, bounds: &Bounds) {
+        let ticket = self.tickets[node.index()];
+        self.insert(frames_until(frame, kind, bounds), Entry { node, kind, ticket });
+    }
+
+    pub fn refused(&mut self, _: &Frame, node: NodeId, kind: Kind) {
+        let ticket = self.tickets[node.index()];
+        self.insert(1.0, Entry { node, kind, ticket });
+    }
+
+    pub fn unwatch(&mut self, node: NodeId) {
+        let ticket = &mut self.tickets[node.index()];
+        *ticket = ticket.wrapping_add(1);
+    }
+
+    fn insert(&mut self, frames: f64, entry: Entry) {
+        // At least 1, as in Figure 7; `as` saturates.
+        let ahead = (frames as u64).clamp(1, HORIZON - 1);
+        self.lists[((self.frame + ahead) % HORIZON) as usize].push(entry);
+    }
+}
+
+/// "Rapid Movements": the frame number is incremented by as many frames as the motion would have taken at full speed.
+fn frames_passed(frame: &Frame, before: &[View]) -> u64 {
+    let mut frames = 1.0_f64;
+    if before.len() != frame.views.len() {
+        return HORIZON;
+    }
+    for (b, a) in before.iter().zip(frame.views) {
+        let moved = a.eye.distance(b.eye) / frame.speed.rho;
+        let turned = a.direction.dot(b.direction).clamp(-1.0, 1.0).acos() / frame.speed.omega;
+        for ratio in [moved, turned] {
+            if ratio > frames {
+                frames = ratio.ceil();
+            }
+        }
+    }
+    (frames as u64).min(HORIZON)
+}
+
+fn frames_until(frame: &Frame, kind: Kind, bounds: &Bounds) -> f64 {
+    let times = frame.views.iter().map(|view| frames_until_for(frame, view, kind, bounds));
+    match kind {
+        Kind::Unfold => times.fold(f64::INFINITY, f64::min),
+        Kind::Fold => times.fold(0.0, f64::max),
+    }
+}
+
+fn frames_until_for(frame: &Frame, view: &View, kind: Kind, bounds: &Bounds) -> f64 {
+    let to_center = DVec3::from(bounds.center.map(f64::from)) - view.eye;
+    let distance = to_center.length();
+    let radius = f64::from(bounds.radius);
+    let reach = frame.criterion.reach_distance(bounds, view.k);
+    let phi = (radius / distance).min(1.0).asin();
+    let alpha = (view.direction.dot(to_center) / distance).clamp(-1.0, 1.0).acos();
+    let beta = view.sin_beta.atan2(view.cos_beta);
+    let (rho, omega) = (frame.speed.rho, frame.speed.omega);
+    match kind {
+        Kind::Unfold => {
+            let inside = ((distance - radius) / rho).ceil();
+            let visible = ((alpha - phi - beta) / omega).ceil();
+            let coarse = ((distance - reach) / rho).ceil();
+            inside.min(visible.max(coarse))
+        }
+        Kind::Fold => {
+            let outside = ((radius - distance) / rho).ceil();
+            let invisible = ((beta + phi - alpha) / omega).ceil();
+            let fine = ((reach - distance) / rho).ceil();
+            outside.max(invisible.min(fine))
+        }
+    }
+}

@@ -1,0 +1,110 @@
+//! Spheres and errors of the nodes, nested and saturated over everything that must be folded before.
+//!
+//! A collapse replaces the star of a vertex. It can be made only where the triangles of that star are as they were
+//! when it was recorded, so it depends on its two children in the tree *and* on the collapses that last changed those
+//! triangles (the arcs of a multi-triangulation: De Floriani, Magillo & Puppo 1997). For each of these predecessors
+//! `m` of a node `n`
+//!
+//! ```text
+//! |c_n - c_m| + r_m <= r_n    and    eps_m <= eps_n.
+//! ```
+//!
+//! Both unfold tests of the criterion, `d < r` and `d <= r + eps k`, then pass for `n` wherever they pass for `m`, and
+//! a view cone that touches the sphere of `m` touches that of `n`. So the set of nodes that want to be unfolded is
+//! closed under all predecessors, whatever the camera, and the mesh it shows consists of stars as the simplification
+//! itself went through them.
+
+use glam::DVec3;
+use vertex_tree::{Bounds, Collapse, NONE};
+
+use super::ball::{Ball, enclosing_center, radius_around};
+
+/// By this part a sphere is larger than it need be, so that rounding in a later test can not invert parent and
+/// child. Twice 2^-20, because the promise is in terms of the larger radius.
+const RELATIVE_SLACK: f64 = 1.0 / (1 << 19) as f64;
+/// And by this part of the extent of the mesh.
+const ABSOLUTE_SLACK: f64 = 1.0 / (1_u64 << 40) as f64;
+
+/// The nodes made so far.
+#[derive(Debug)]
+pub(super) struct Nodes {
+    pub collapses: Vec<Collapse>,
+    /// For each node, the length of the longest chain of predecessors down to the input, counting itself.
+    pub depth: Vec<u32>,
+    /// For each vertex, the node at which it now stands, or `NONE`.
+    pub top: Vec<u32>,
+    /// For each vertex, the distance to the farthest corner of its input triangles.
+    leaf_radius: Vec<f32>,
+    slack: f64,
+    predecessors: Vec<u32>,
+    balls: Vec<Ball>,
+}
+
+impl Nodes {
+    /// `extent` is the diagonal of the mesh's bounding box.
+    pub fn new(leaf_radius: Vec<f32>, extent: f64) -> Nodes {
+        Nodes {
+            collapses: Vec::with_capacity(leaf_radius.len()),
+            depth: Vec::with_capacity(leaf_radius.len()),
+            top: vec![NONE; leaf_radius.len()],
+            leaf_radius,
+            slack: extent * ABSOLUTE_SLACK,
+            predecessors: Vec::new(),
+            balls: Vec::new(),
+        }
+    }
+
+    /// The number that the next node gets.
+    pub fn next(&self) -> u32 {
+        self.collapses.len() as u32
+    }
+
+    /// Makes the node of a collapse. `creators` are the collapses that last changed the triangles around `removed`,
+    /// `NONE` for untouched ones; `positions` are those of the two vertices.
+    pub fn add(
+        &mut self,
+        [removed, kept]: [u32; 2],
+        positions: [DVec3; 2],
+        creators: impl Iterator<Item = u32>,
+        error: f32,
+    ) {
+        self.predecessors.clear();
+        self.balls.clear();
+        for (v, center) in [removed, kept].into_iter().zip(positions) {
+            match self.top[v as usize] {
+                NONE => {
+                    self.balls.push(Ball { center, radius: f64::from(self.leaf_radius[v as usize]) });
+                }
+                node => self.predecessors.push(node),
+            }
+        }
+        for node in creators {
+            if node != NONE && !self.predecessors.contains(&node) {
+                self.predecessors.push(node);
+            }
+        }
+        let (mut eps, mut depth) = (error, 0);
+        for &node in &self.predecessors {
+            let b = self.collapses[node as usize].bounds;
+            self.balls.push(Ball { center: b.center.map(f64::from).into(), radius: f64::from(b.radius) });
+            eps = eps.max(b.eps);
+            depth = depth.max(self.depth[node as usize]);
+        }
+        let center = enclosing_center(&self.balls).as_vec3();
+        let radius = radius_around(center.as_dvec3(), &self.balls);
+        let radius = round_up((radius + self.slack) * (1.0 + RELATIVE_SLACK));
+        self.top[kept as usize] = self.next();
+        self.collapses.push(Collapse {
+            removed,
+            kept,
+            bounds: Bounds { center: center.to_array(), radius, eps },
+        });
+        self.depth.push(depth + 1);
+    }
+}
+
+/// The least single-precision number that is not below `x`.
+pub(super) fn round_up(x: f64) -> f32 {
+    let y = x as f32;
+    if f64::from(y) < x { y.next_up() } else { y }
+}

@@ -1,0 +1,33 @@
+//! Vertex numbers that are close where the vertices are close.
+//!
+//! Vertices are sorted along the Z-order curve (Morton 1966) through a grid of 1024 cells a side over the bounding
+//! box, so that a star, and the stars around it, share cache lines whatever the order of the input.
+
+use glam::Vec3;
+
+/// The input numbers of the vertices in spatial order.
+pub(super) fn spatial_order(positions: &[Vec3]) -> Vec<u32> {
+    let lo = positions.iter().fold(Vec3::INFINITY, |lo, &p| lo.min(p));
+    let hi = positions.iter().fold(Vec3::NEG_INFINITY, |hi, &p| hi.max(p));
+    let side = (hi - lo).max_element();
+    let cells = if side > 0.0 { 1023.99 / side } else { 0.0 };
+    let mut order: Vec<u64> = (0_u64..)
+        .zip(positions)
+        .map(|(v, &p)| {
+            let cell = (p - lo) * cells;
+            let key = spread(cell.x as u32) | spread(cell.y as u32) << 1 | spread(cell.z as u32) << 2;
+            u64::from(key) << 32 | v
+        })
+        .collect();
+    order.sort_unstable();
+    order.into_iter().map(|entry| entry as u32).collect()
+}
+
+/// Puts two zero bits between each of the lowest 10 bits.
+fn spread(x: u32) -> u32 {
+    let x = x & 0x3ff;
+    let x = (x | x << 16) & 0x0300_00ff;
+    let x = (x | x << 8) & 0x0300_f00f;
+    let x = (x | x << 4) & 0x030c_30c3;
+    (x | x << 2) & 0x0924_9249
+}

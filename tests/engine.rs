@@ -1,0 +1,221 @@
+//! Every strategy against the brute-force cut, on hierarchies and motions that are as nasty as random can make them.
+
+mod common;
+
+use std::collections::BTreeSet;
+use std::sync::Arc;
+
+use common::{Random, bumpy_grid, random_log, random_step, random_view, turn};
+use foldfront::CollapseLog;
+use foldfront::active_mesh::ActiveMesh;
+use foldfront::budget::Budget;
+use foldfront::criterion::Criterion;
+use foldfront::engine::{Engine, Settings};
+use foldfront::oracle::Oracle;
+use foldfront::refine::Strategy;
+use foldfront::vertex_tree::{NONE, NullSink};
+use foldfront::view::View;
+use in_memory::{Hierarchy, InMemoryTree};
+
+fn engine(log: &CollapseLog, settings: Settings) -> Engine<InMemoryTree, ActiveMesh> {
+    let tree = InMemoryTree::new(Arc::new(Hierarchy::new(log).unwrap()));
+    let mesh = ActiveMesh::new(&tree);
+    Engine::new(tree, mesh, settings).unwrap()
+}
+
+/// The displayed triangles by definition: for each input triangle the vertices that its corners are merged into by
+/// the folded nodes, if they are three.
+fn displayed(log: &CollapseLog, active: &[bool]) -> BTreeSet<(u32, [u32; 3])> {
+    let mut into: Vec<u32> = (0..log.mesh.positions.len() as u32).collect();
+    // Later collapses are higher up: resolve from the top.
+    for (c, _) in log.collapses.iter().zip(active).rev().filter(|&(_, &active)| !active) {
+        into[c.removed as usize] = into[c.kept as usize];
+    }
+    (0..)
+        .zip(&log.mesh.triangles)
+        .map(|(t, corners)| (t, corners.map(|v| into[v as usize])))
+        .filter(|(_, [a, b, c])| a != b && b != c && c != a)
+        .collect()
+}
+
+fn shown(engine: &Engine<InMemoryTree, ActiveMesh>) -> BTreeSet<(u32, [u32; 3])> {
+    let (mesh, hierarchy) = (engine.mesh(), engine.tree().hierarchy());
+    mesh.triangle_ids()
+        .iter()
+        .zip(mesh.triangles())
+        .map(|(&t, corners)| {
+            let vertices = corners.map(|slot| {
+                let vertex = mesh.vertex_ids()[slot as usize];
+                assert_ne!(vertex, NONE, "a triangle names a hole in the vertex buffer");
+                hierarchy.input_vertex(vertex)
+            });
+            (hierarchy.input_triangle(t), vertices)
+        })
+        .collect()
+}
+
+#[test]
+fn all_strategies_agree_with_the_oracle_and_show_its_mesh() {
+    for seed in 0..12 {
+        let mut random = Random(seed);
+        let log = random_log(bumpy_grid(18, &mut random), &mut random);
+        let mut oracle = Oracle::new(&log).unwrap();
+        let criterion = if seed % 3 == 0 { Criterion::SphereSize } else { Criterion::ScreenError };
+        let k = if criterion == Criterion::SphereSize { 4.0 } else { 150.0 };
+        let speed = [(0.02, 0.02), (1e-4, 1e-4), (0.0, 0.02), (0.3, 0.0)][seed as usize % 4];
+        let settings = Settings { criterion, rho: speed.0, omega: speed.1, ..Settings::default() };
+        let mut engines: Vec<_> =
+            Strategy::ALL.iter().map(|&strategy| engine(&log, Settings { strategy, ..settings })).collect();
+        let mut views = vec![View { k, ..random_view(&mut random) }];
+        for frame in 0..400 {
+            for view in &mut views {
+                random_step(view, &mut random);
+            }
+            match frame {
+                // A second eye for a while, none at all for a moment, another lens, another tolerance.
+                100 => views.push(View { k: k / 3.0, ..random_view(&mut random) }),
+                200 => views.clear(),
+                201 => views.push(View { k, ..random_view(&mut random) }),
+                250 => (views[0].cos_beta, views[0].sin_beta) = (0.8, 0.6),
+                300 => views[0].k *= 3.0,
+                _ => {}
+            }
+            for engine in &mut engines {
+                let strategy = engine.settings().strategy;
+                let report = engine.advance(&views).unwrap();
+                if strategy.is_exact() {
+                    let difference = oracle.compare(engine);
+                    assert_eq!(difference, None, "{strategy:?}, seed {seed}, frame {frame}");
+                }
+                assert_eq!(report.triangles, engine.mesh().triangles().len() as u64);
+                if frame % 16 == 0 {
+                    let mut active = vec![false; log.collapses.len()];
+                    let hierarchy = engine.tree().hierarchy();
+                    engine.for_each_active(|n| active[hierarchy.log_number(n) as usize] = true);
+                    assert_eq!(
+                        shown(engine),
+                        displayed(&log, &active),
+                        "{strategy:?}, seed {seed}, frame {frame}"
+                    );
+                }
+            }
+        }
+    }
+}
+
+#[test]
+fn a_slow_pan_flips_every_node_in_its_frame() {
+    // 1e-5 radians a frame: the arc cosine of an f32 dot product would not see it.
+    let mut random = Random(7);
+    let log = random_log(bumpy_grid(24, &mut random), &mut random);
+    let mut oracle = Oracle::new(&log).unwrap();
+    let tree = InMemoryTree::new(Arc::new(Hierarchy::new(&log).unwrap()));
+    let mut engine = Engine::new(tree, NullSink, Settings { rho: 0.05, ..Settings::default() }).unwrap();
+    let mut view = random_view(&mut random);
+    let axis = view.direction.any_orthogonal_vector().normalize();
+    let (mut changes, mut tests) = (0, 0);
+    for frame in 0..1_000_000 {
+        view.direction = (glam::DQuat::from_axis_angle(axis, 1e-5) * view.direction).normalize();
+        let report = engine.advance(&[view]).unwrap();
+        changes += report.unfolds + report.folds;
+        tests += report.tests;
+        assert_eq!(oracle.compare(&engine), None, "frame {frame}");
+    }
+    assert!(changes > 100, "only {changes} changes in more than a full turn");
+    assert!(
+        tests < 1_000_000 * log.collapses.len() as u64 / 20,
+        "{tests} tests: the schedule spares nothing"
+    );
+}
+
+#[test]
+fn nothing_is_tested_at_rest() {
+    let mut random = Random(3);
+    let log = random_log(bumpy_grid(20, &mut random), &mut random);
+    let mut engine = engine(&log, Settings::default());
+    let view = random_view(&mut random);
+    assert!(engine.advance(&[view]).unwrap().tests > 0);
+    for _ in 0..10 {
+        assert_eq!(engine.advance(&[view]).unwrap().tests, 0);
+    }
+}
+
+#[test]
+fn a_triangle_budget_is_met_and_the_cut_stays_exact() {
+    for strategy in [Strategy::TopDown, Strategy::Front, Strategy::Event] {
+        let mut random = Random(11);
+        let log = random_log(bumpy_grid(40, &mut random), &mut random);
+        let mut oracle = Oracle::new(&log).unwrap();
+        let settings =
+            Settings { strategy, rho: 0.02, budget: Budget::Triangles(600), ..Settings::default() };
+        let mut engine = engine(&log, settings);
+        // From outside of every sphere: what the eye is inside of is shown at any tolerance.
+        let eye = 5.0 * random.direction();
+        let mut view = View { eye, direction: -eye.normalize(), ..random_view(&mut random) };
+        for (budget, frames) in [(600, 500), (200, 500), (1500, 500)] {
+            engine.set_budget(Budget::Triangles(budget));
+            let mut last = 0;
+            for frame in 0..frames {
+                // Moves gently for a while, then lets the tolerance settle.
+                if frame < frames / 2 {
+                    turn(&mut view, 0.002, &mut random);
+                }
+                last = engine.advance(&[view]).unwrap().triangles;
+                assert_eq!(oracle.compare(&engine), None, "{strategy:?}, budget {budget}, frame {frame}");
+            }
+            assert!(last <= budget && last > budget * 3 / 4, "{strategy:?}: {last} triangles of {budget}");
+        }
+        engine.set_budget(Budget::None);
+        engine.advance(&[view]).unwrap();
+        assert_eq!(engine.views(), &[view]);
+        assert_eq!(oracle.compare(&engine), None);
+    }
+}
+
+#[test]
+fn unfolding_everything_gives_the_input_and_folding_everything_the_base_mesh() {
+    let mut random = Random(5);
+    let log = random_log(bumpy_grid(25, &mut random), &mut random);
+    let mut engine = engine(&log, Settings::default());
+    let base = shown(&engine);
+    assert_eq!(base, displayed(&log, &vec![false; log.collapses.len()]));
+    let near = View { k: 1e12, ..random_view(&mut random) };
+    // Looking every way at once.
+    let everywhere: Vec<View> =
+        (0..6).map(|i| View { direction: [1.0, -1.0][i % 2] * glam::DVec3::AXES[i / 2], ..near }).collect();
+    let report = engine.advance(&everywhere).unwrap();
+    assert_eq!(report.active_nodes, log.collapses.len() as u64);
+    let all: BTreeSet<_> = (0..).zip(log.mesh.triangles.iter().copied()).collect();
+    assert_eq!(shown(&engine), all);
+    engine.advance(&[]).unwrap();
+    assert_eq!(shown(&engine), base);
+}
+
+#[test]
+fn a_renderer_that_patches_only_what_changed_has_the_same_buffers() {
+    let mut random = Random(9);
+    let log = random_log(bumpy_grid(25, &mut random), &mut random);
+    let mut engine = engine(&log, Settings { rho: 0.02, ..Settings::default() });
+    let mut view = random_view(&mut random);
+    let (mut vertices, mut triangles) = (Vec::new(), Vec::new());
+    for _ in 0..500 {
+        random_step(&mut view, &mut random);
+        engine.advance(&[view]).unwrap();
+        let mesh = engine.mesh_mut();
+        vertices.resize(mesh.positions().len(), [0.0; 3]);
+        triangles.resize(triangles.len().max(mesh.triangles().len()), [0; 3]);
+        for &slot in mesh.changed_vertices() {
+            vertices[slot as usize] = mesh.positions()[slot as usize];
+        }
+        for &slot in mesh.changed_triangles() {
+            if let Some(&triangle) = mesh.triangles().get(slot as usize) {
+                triangles[slot as usize] = triangle;
+            }
+        }
+        mesh.clear_changes();
+        assert_eq!(&triangles[..mesh.triangles().len()], mesh.triangles());
+        for &vertex in triangles[..mesh.triangles().len()].as_flattened() {
+            assert_eq!(vertices[vertex as usize], mesh.positions()[vertex as usize]);
+        }
+    }
+}

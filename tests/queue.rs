@@ -1,0 +1,213 @@
+//! The event queue against an ordered map, and the time bounds against random motion.
+
+use std::collections::BTreeMap;
+use std::collections::btree_map::Entry;
+
+use foldfront::criterion::Criterion;
+use foldfront::motion::{Motion, Odometer, Speed};
+use foldfront::queue::{EventQueue, Kind, TICKS_PER_FRAME};
+use foldfront::view::View;
+use foldfront::{Bounds, NodeId};
+use glam::DVec3;
+use proptest::prelude::*;
+
+#[derive(Clone, Debug)]
+enum Operation {
+    Schedule { node: u32, frames: f64 },
+    Press { node: u32 },
+    Cancel { node: u32 },
+    Advance { frames: f64 },
+    Rest,
+    TakeAll,
+}
+
+fn operation() -> impl Strategy<Value = Operation> {
+    let node = 0..40_u32;
+    let frames = prop_oneof![Just(0.0), 0.0..2.0, 0.0..100.0, 0.0..1e7, Just(1e30), Just(f64::INFINITY)];
+    let motion = prop_oneof![Just(1e-300), 0.0..0.2, 0.0..3.0, 0.0..500.0, 0.0..1e6];
+    prop_oneof![
+        6 => (node.clone(), frames).prop_map(|(node, frames)| Operation::Schedule { node, frames }),
+        1 => node.clone().prop_map(|node| Operation::Press { node }),
+        2 => node.prop_map(|node| Operation::Cancel { node }),
+        6 => motion.prop_map(|frames| Operation::Advance { frames }),
+        1 => Just(Operation::Rest),
+        1 => Just(Operation::TakeAll),
+    ]
+}
+
+/// The model: for each scheduled node, when it was scheduled and its deadline, or none if it presses.
+type Model = BTreeMap<u32, Option<(f64, f64)>>;
+
+const BOUNDS: Bounds = Bounds { center: [0.0; 3], radius: 1.0, eps: 0.0 };
+
+proptest! {
+    #![proptest_config(ProptestConfig::with_cases(2000))]
+
+    /// Every event comes up exactly once and never late; never much too early; a cancelled one never does; events
+    /// whose deadline lies in the tick that the clock is in come up at every advance.
+    #[test]
+    fn queue_agrees_with_an_ordered_map(operations in prop::collection::vec(operation(), 1..200)) {
+        let mut queue = EventQueue::new(40);
+        let mut model = Model::new();
+        let mut now = 0.0;
+        for operation in operations {
+            let mut due = Vec::new();
+            match operation {
+                Operation::Schedule { node, frames } => {
+                    if let Entry::Vacant(entry) = model.entry(node) {
+                        queue.schedule(now, frames, NodeId(node), Kind::Unfold, BOUNDS);
+                        entry.insert(Some((now, now + frames)));
+                    }
+                    continue;
+                }
+                Operation::Press { node } => {
+                    if let Entry::Vacant(entry) = model.entry(node) {
+                        queue.press(NodeId(node), Kind::Unfold, BOUNDS);
+                        entry.insert(None);
+                    }
+                    continue;
+                }
+                Operation::Cancel { node } => {
+                    model.remove(&node);
+                    queue.cancel(NodeId(node));
+                    continue;
+                }
+                Operation::Advance { frames } => {
+                    now += frames;
+                    queue.advance(now, true, &mut due);
+                    for event in &due {
+                        let scheduled = model.remove(&event.node.0);
+                        prop_assert!(scheduled.is_some(), "node {} came up unscheduled", event.node.0);
+                        if let Some(Some((since, deadline))) = scheduled {
+                            // A slot is at most a quarter as wide as the time it was ahead; the horizon is finite.
+                            let early = deadline - now;
+                            prop_assert!(
+                                early <= (deadline - since) / 4.0 + 1.0 / TICKS_PER_FRAME || deadline > 1e12,
+                                "scheduled at {since} for {deadline}, came up at {now}"
+                            );
+                        }
+                    }
+                    for (node, scheduled) in &model {
+                        prop_assert!(scheduled.is_some_and(|(_, deadline)| deadline > now), "node {node} is late");
+                    }
+                }
+                Operation::Rest => {
+                    queue.advance(now, false, &mut due);
+                    for event in &due {
+                        prop_assert_eq!(model.remove(&event.node.0), Some(None));
+                    }
+                    prop_assert!(model.values().all(Option::is_some), "a pressing event did not come up");
+                }
+                Operation::TakeAll => {
+                    queue.take_all(&mut due);
+                    for event in &due {
+                        prop_assert!(model.remove(&event.node.0).is_some());
+                    }
+                    prop_assert!(model.is_empty());
+                }
+            }
+        }
+        // At the end of time, or at a motion without bounds, everything that is left comes up.
+        let mut due = Vec::new();
+        queue.take_all(&mut due);
+        let mut left: Vec<u32> = due.iter().map(|e| e.node.0).collect();
+        left.sort_unstable();
+        prop_assert_eq!(left, model.into_keys().collect::<Vec<_>>());
+        prop_assert!(queue.is_empty());
+    }
+
+    /// However the camera moves, a node does not change its answer before its bound has passed on the odometer.
+    #[test]
+    fn bounds_never_miss(
+        center in prop::array::uniform3(-10.0..10.0_f32),
+        radius in prop_oneof![0.0..0.1_f32, 0.0..5.0_f32],
+        eps in prop_oneof![Just(0.0_f32), 0.0..0.01_f32, 0.0..0.5_f32],
+        sphere_size in any::<bool>(),
+        seed in any::<u64>(),
+        (rho, omega, kappa) in (
+            prop_oneof![Just(0.0), 0.001..0.5],
+            prop_oneof![Just(0.0), 0.0001..0.1],
+            prop_oneof![Just(0.0), 0.01..5.0],
+        ),
+    ) {
+        let bounds = Bounds { center, radius, eps };
+        let criterion = if sphere_size { Criterion::SphereSize } else { Criterion::ScreenError };
+        let speed = Speed { rho, omega, kappa };
+        let mut random = Random(seed);
+        let mut views = vec![random.view(), random.view()];
+        if random.unit() < 0.5 {
+            views.pop();
+        }
+        let mut clock = Odometer::default();
+        let mut active = criterion.unfold(&views, &bounds);
+        let mut deadline = 0.0;
+        for _ in 0..300 {
+            let bound = if active {
+                criterion.earliest_fold(&views, &speed, &bounds)
+            } else {
+                criterion.earliest_unfold(&views, &speed, &bounds)
+            };
+            deadline = f64::max(deadline, clock.now() + bound);
+            let before = views.clone();
+            for view in &mut views {
+                random.step(view, &speed, center);
+            }
+            match clock.advance(&speed, &before, &views) {
+                Motion::Rest => prop_assert_eq!(criterion.unfold(&views, &bounds), active),
+                Motion::Unbounded => deadline = 0.0,
+                Motion::Frames(_) => {}
+            }
+            let now_active = criterion.unfold(&views, &bounds);
+            if now_active != active {
+                prop_assert!(clock.now() >= deadline, "flipped at {}, bound {deadline}", clock.now());
+                active = now_active;
+                deadline = 0.0;
+            }
+        }
+    }
+}
+
+/// A small generator for motions; what matters is that they are varied and go straight for the marks.
+struct Random(u64);
+
+impl Random {
+    fn unit(&mut self) -> f64 {
+        self.0 = self.0.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
+        (self.0 >> 11) as f64 / (1_u64 << 53) as f64
+    }
+
+    fn direction(&mut self) -> DVec3 {
+        loop {
+            let v = DVec3::new(self.unit(), self.unit(), self.unit()) * 2.0 - 1.0;
+            if (0.01..1.0).contains(&v.length_squared()) {
+                return v.normalize();
+            }
+        }
+    }
+
+    fn view(&mut self) -> View {
+        let beta = 0.1 + 1.3 * self.unit();
+        View {
+            eye: self.direction() * 12.0 * self.unit(),
+            direction: self.direction(),
+            cos_beta: beta.cos(),
+            sin_beta: beta.sin(),
+            k: 1.0 + 200.0 * self.unit(),
+        }
+    }
+
+    /// Moves a view by up to full speed in each way at once, as often as not straight at or away from the centre.
+    fn step(&mut self, view: &mut View, speed: &Speed, center: [f32; 3]) {
+        let to_center = (DVec3::from(center.map(f64::from)) - view.eye).normalize_or(DVec3::X);
+        let sign = if self.unit() < 0.5 { 1.0 } else { -1.0 };
+        let way = if self.unit() < 0.6 { to_center * sign } else { self.direction() };
+        view.eye += way * speed.rho * self.unit();
+        let aim = if self.unit() < 0.6 { to_center * sign } else { self.direction() };
+        let axis = view.direction.cross(aim);
+        if axis.length() > 1e-9 {
+            let turn = glam::DQuat::from_axis_angle(axis.normalize(), speed.omega * self.unit());
+            view.direction = (turn * view.direction).normalize();
+        }
+        view.k = (view.k + speed.kappa * (self.unit() - 0.5) * 2.0).max(1.0);
+    }
+}
