@@ -161,7 +161,7 @@ fn facets(
 /// How bright a surface with this normal (of any length) is.
 fn brightness(normal: DVec3, from_behind: bool, projection: &Projection) -> f64 {
     let facing = if from_behind { -normal } else { normal };
-    let cosine = projection.from_camera(LIGHT).normalize().dot(facing.normalize_or_zero());
+    let cosine = projection.to_object(LIGHT).normalize().dot(facing.normalize_or_zero());
     let lit = ((cosine + WRAP) / (1.0 + WRAP)).max(0.0);
     (AMBIENT + (1.0 - AMBIENT) * lit) * if from_behind { BACK_FACE } else { 1.0 }
 }

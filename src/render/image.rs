@@ -3,6 +3,8 @@
 use std::io;
 use std::path::{Path, PathBuf};
 
+use crate::output;
+
 /// A picture of 8-bit sRGB pixels.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Image {
@@ -64,24 +66,13 @@ impl Image {
         })
     }
 
-    /// Writes a PNG file: to a temporary name beside `path`, then renamed.
+    /// Writes a PNG file, whole or not at all.
     ///
     /// # Errors
     /// [`ImageError`].
     pub fn write_png(&self, path: &Path) -> Result<(), ImageError> {
         let bytes = self.png_bytes()?;
-        let write = || {
-            let folder = match path.parent() {
-                Some(p) if !p.as_os_str().is_empty() => p,
-                _ => Path::new("."),
-            };
-            let mut temporary = tempfile::Builder::new().prefix(".foldfront-").tempfile_in(folder)?;
-            io::Write::write_all(&mut temporary, &bytes)?;
-            temporary.as_file().sync_all()?;
-            temporary.persist(path)?;
-            Ok(())
-        };
-        write().map_err(|source| ImageError::Io { file: path.to_owned(), source })
+        output::write(path, &bytes).map_err(|source| ImageError::Io { file: path.to_owned(), source })
     }
 }
 

@@ -68,7 +68,7 @@ impl Projection {
     }
 
     /// Turns a vector from camera space to object space.
-    pub(super) fn from_camera(&self, v: DVec3) -> DVec3 {
+    pub(super) fn to_object(&self, v: DVec3) -> DVec3 {
         self.axes[0] * v.x + self.axes[1] * v.y + self.axes[2] * v.z
     }
 
