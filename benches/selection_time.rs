@@ -49,11 +49,14 @@ fn main() {
             let mut runs = Vec::new();
             for walk in path::recorded(kind).expect("recorded paths are valid") {
                 let frames = 0..walk.frames.len();
-                runs.extend(subject.replay(&walk, frames, &options, quiet).expect("nothing can fail in memory"));
+                runs.extend(
+                    subject.replay(&walk, frames, &options, quiet).expect("nothing can fail in memory"),
+                );
             }
             let section = Section { name, facts: Vec::new(), runs, pictures: Vec::new() };
             let file = folder.join(format!("{}-{setting}.svg", kind.name()));
-            output::write(&file, section.curves().as_bytes()).expect("target is writable");
+            output::write(&file, section.curves().expect("curves can be drawn").as_bytes())
+                .expect("target is writable");
             let report = Report { command: String::new(), sections: vec![section] };
             println!("{}\n{}", report.to_text(), file.display());
         }

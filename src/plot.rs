@@ -111,6 +111,29 @@ pub fn curves(plot: &Plot, series: &[Series]) -> Result<String, PlotError> {
     Ok(svg.replacen(&fine, &format!("width=\"{width}\" height=\"{height}\""), 1))
 }
 
+/// Puts pictures that [`curves`] drew below each other, as one.
+#[must_use]
+pub fn stack(pictures: &[String]) -> String {
+    // Each starts with the size that `curves` gave it.
+    let height = |svg: &String| -> i32 {
+        svg.split_once("height=\"")
+            .and_then(|(_, rest)| rest.split('"').next()?.parse().ok())
+            .unwrap_or(SIZE.1)
+    };
+    let total: i32 = pictures.iter().map(height).sum();
+    let mut stacked = format!(
+        "<svg width=\"{0}\" height=\"{total}\" viewBox=\"0 0 {0} {total}\" xmlns=\"http://www.w3.org/2000/svg\">\n",
+        SIZE.0
+    );
+    let mut y = 0;
+    for picture in pictures {
+        stacked.push_str(&picture.replacen("<svg ", &format!("<svg y=\"{y}\" "), 1));
+        y += height(picture);
+    }
+    stacked.push_str("</svg>\n");
+    stacked
+}
+
 /// Draws axes, grid and curves between the lines `top` and `bottom` of the picture.
 fn draw_curves(canvas: &Canvas, plot: &Plot, series: &[Series], top: i32, bottom: i32) -> Drawn {
     let (left, right) = (LEFT, SIZE.0 - RIGHT);

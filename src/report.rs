@@ -8,7 +8,7 @@ use base64::engine::general_purpose::STANDARD;
 
 use crate::compare::Run;
 use crate::compare::csv::Summary;
-use crate::plot::{self, Series};
+use crate::plot::{self, Plot, PlotError, Series};
 use crate::refine::Strategy;
 
 /// A picture with what it shows.
@@ -39,27 +39,37 @@ impl Section {
     }
 
     /// Selection time along every path, one curve a strategy, a panel a path.
-    #[must_use]
-    pub fn curves(&self) -> String {
-        let panels: Vec<String> = self
-            .paths()
-            .map(|runs| {
-                let series: Vec<Series> = runs.iter().map(selection_curve).collect();
-                let title = format!("{}: {}", self.name, runs[0].path);
-                let first_frame = runs[0].rows.first().map_or(0, |row| row.frame);
-                plot::curves(&title, "frame", "selection time, ms", first_frame, &series)
-            })
-            .collect();
-        plot::stack(&panels)
+    ///
+    /// # Errors
+    /// What [`plot::curves`] says.
+    pub fn curves(&self) -> Result<String, PlotError> {
+        let panels: Vec<String> =
+            self.paths().map(|runs| panel(&self.name, runs)).collect::<Result<_, _>>()?;
+        Ok(plot::stack(&panels))
     }
 }
 
-fn selection_curve(run: &Run) -> Series {
-    Series {
-        name: run.strategy.name().to_owned(),
-        color: Strategy::ALL.iter().position(|&s| s == run.strategy).unwrap_or(0),
-        values: run.rows.iter().map(|row| milliseconds(row.report.select)).collect(),
-    }
+fn panel(scene: &str, runs: &[Run]) -> Result<String, PlotError> {
+    let values: Vec<Vec<f64>> =
+        runs.iter().map(|run| run.rows.iter().map(|row| milliseconds(row.report.select)).collect()).collect();
+    let series: Vec<Series> = runs
+        .iter()
+        .zip(&values)
+        .map(|(run, values)| Series {
+            name: run.strategy.name(),
+            values,
+            colour: Strategy::ALL.iter().position(|&s| s == run.strategy).unwrap_or(0),
+        })
+        .collect();
+    let plot = Plot {
+        title: &format!("{scene}, path {}", runs[0].path),
+        x_label: "frame",
+        y_label: "selection time, ms",
+        first_frame: runs[0].rows.first().map_or(0, |row| row.frame),
+        logarithmic: true,
+        median_window: 15,
+    };
+    plot::curves(&plot, &series)
 }
 
 fn milliseconds(time: Duration) -> f64 {
@@ -83,7 +93,10 @@ const COLUMNS: [(&str, &str); 12] = [
     ("tests / change", "the ideal is 1"),
     ("active nodes", "mean over the frames"),
     ("triangles", "displayed, mean over the frames"),
-    ("wrong nodes", "nodes whose status is not the oracle's, mean and most in a frame, where that was checked"),
+    (
+        "wrong nodes",
+        "nodes whose status is not the oracle's, mean and most in a frame, where that was checked",
+    ),
     ("vs top-down", "median of top-down over this median"),
 ];
 
@@ -132,7 +145,11 @@ impl Report {
             let _ = writeln!(text, "\n{}, path {}", runs[0].scene, runs[0].path);
             for row in &rows {
                 for (at, (cell, width)) in row.iter().zip(widths).enumerate() {
-                    let _ = if at == 0 { write!(text, "{cell:width$}") } else { write!(text, "  {cell:>width$}") };
+                    let _ = if at == 0 {
+                        write!(text, "{cell:width$}")
+                    } else {
+                        write!(text, "  {cell:>width$}")
+                    };
                 }
                 text.truncate(text.trim_end().len());
                 text.push('\n');
@@ -142,8 +159,10 @@ impl Report {
     }
 
     /// The page.
-    #[must_use]
-    pub fn to_html(&self) -> String {
+    ///
+    /// # Errors
+    /// What [`plot::curves`] says.
+    pub fn to_html(&self) -> Result<String, PlotError> {
         let mut html = String::new();
         let _ = write!(
             html,
@@ -156,14 +175,14 @@ impl Report {
         );
         self.overview(&mut html);
         for section in &self.sections {
-            section_html(&mut html, section);
+            section_html(&mut html, section)?;
         }
         html.push_str("<h2>Columns</h2>\n<dl>\n");
         for (name, meaning) in COLUMNS {
             let _ = writeln!(html, "<dt>{}<dd>{}", escape(name), escape(meaning));
         }
         html.push_str("</dl>\n</html>\n");
-        html
+        Ok(html)
     }
 
     /// One line a path: who is fastest, and by how much.
@@ -188,21 +207,22 @@ impl Report {
             for strategy in Strategy::ALL {
                 let _ = write!(html, "<td>{}", median(strategy).map_or_else(String::new, microseconds));
             }
-            let ratio = median(Strategy::TopDown)
-                .zip(median(Strategy::Event))
-                .map_or_else(String::new, |(t, e)| format!("{:.1} ×", t.as_secs_f64() / e.as_secs_f64().max(1e-9)));
+            let ratio =
+                median(Strategy::TopDown).zip(median(Strategy::Event)).map_or_else(String::new, |(t, e)| {
+                    format!("{:.1} ×", t.as_secs_f64() / e.as_secs_f64().max(1e-9))
+                });
             let _ = writeln!(html, "<td>{ratio}");
         }
         html.push_str("</table>\n");
     }
 }
 
-fn section_html(html: &mut String, section: &Section) {
+fn section_html(html: &mut String, section: &Section) -> Result<(), PlotError> {
     let _ = writeln!(html, "<h2>{}</h2>\n<table class=\"facts\">", escape(&section.name));
     for (name, value) in &section.facts {
         let _ = writeln!(html, "<tr><th>{}<td>{}", escape(name), escape(value));
     }
-    let _ = writeln!(html, "</table>\n<figure>{}</figure>", section.curves());
+    let _ = writeln!(html, "</table>\n<figure>{}</figure>", section.curves()?);
     for runs in section.paths() {
         let speed = runs[0].speed;
         let _ = writeln!(
@@ -249,6 +269,7 @@ fn section_html(html: &mut String, section: &Section) {
         );
     }
     html.push_str("</div>\n");
+    Ok(())
 }
 
 fn escape(text: &str) -> String {

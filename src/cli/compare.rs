@@ -34,19 +34,25 @@ pub(super) fn compare(command: &Compare) -> Result<()> {
     let mut report = Report { command: format!("foldfront {}", arguments.join(" ")), sections: Vec::new() };
     for (input, name) in inputs.iter().zip(unique_names(&inputs)) {
         let section = section(command, input, name, &paths, &options)?;
-        write(&command.out.join(format!("selection-{}.svg", section.name)), &section.curves())?;
+        write(&command.out.join(format!("selection-{}.svg", section.name)), &section.curves()?)?;
         report.sections.push(section);
     }
     let runs: Vec<&Run> = report.sections.iter().flat_map(|section| &section.runs).collect();
     csv::write_frames(&command.out.join("frames.csv"), &runs)?;
     csv::write_summary(&command.out.join("summary.csv"), &runs)?;
     let file = command.out.join("report.html");
-    write(&file, &report.to_html())?;
+    write(&file, &report.to_html()?)?;
     print(&format!("{}\nThe report is in {}\n", report.to_text(), file.display()))
 }
 
 /// Everything about one input.
-fn section(command: &Compare, input: &Input, name: String, paths: &[Path], options: &Options) -> Result<Section> {
+fn section(
+    command: &Compare,
+    input: &Input,
+    name: String,
+    paths: &[Path],
+    options: &Options,
+) -> Result<Section> {
     let (log, built) = input.log(false)?;
     let walks = match (paths, input) {
         ([], Input::Scene(scene)) => path::recorded(scene.kind())?.to_vec(),

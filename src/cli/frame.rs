@@ -91,7 +91,7 @@ pub(super) fn deviation(command: &Deviation) -> Result<()> {
         let mut value = measured.to_json();
         value["frame"] = frame.into();
         values.push(value);
-        let _ = writeln!(text, "frame {frame}\n{measured:?}");
+        let _ = writeln!(text, "frame {frame}\n{measured}");
     }
     if command.json { print(&format!("{:#}\n", serde_json::Value::from(values))) } else { print(&text) }
 }

@@ -18,7 +18,9 @@ pub(super) fn build(command: &Build) -> Result<()> {
     let (log, report) = input.log(command.merge_components)?;
     match command.backend {
         // The log is all that the in-memory tree needs.
-        Backend::InMemory => stage(&format!("{}: writing", input.name()), |_| write_log(&command.output, &log))?,
+        Backend::InMemory => {
+            stage(&format!("{}: writing", input.name()), |_| write_log(&command.output, &log))?
+        }
     }
     if let Some(report) = report {
         print(&describe(&report))?;

