@@ -7,7 +7,7 @@
 mod director;
 mod format;
 mod generate;
-// pub mod import;
+pub mod import;
 mod summary;
 
 use glam::{DQuat, DVec3};
