@@ -14,6 +14,7 @@ mod progress;
 use std::io::Write;
 use std::process::ExitCode;
 
+use anyhow::Context;
 use clap::Parser;
 
 use arguments::{Arguments, Command};
@@ -55,6 +56,17 @@ pub fn main() -> ExitCode {
 
 fn is_broken_pipe(cause: &(dyn std::error::Error + 'static)) -> bool {
     cause.downcast_ref::<std::io::Error>().is_some_and(|e| e.kind() == std::io::ErrorKind::BrokenPipe)
+}
+
+/// Whether a file could be written there: said before the work, not after it.
+fn check_writable(file: &std::path::Path) -> anyhow::Result<()> {
+    let folder = match file.parent() {
+        Some(parent) if !parent.as_os_str().is_empty() => parent,
+        _ => std::path::Path::new("."),
+    };
+    anyhow::ensure!(!file.is_dir(), "{}: is a folder", file.display());
+    tempfile::tempfile_in(folder).with_context(|| file.display().to_string())?;
+    Ok(())
 }
 
 /// Writes to standard output, whose reader may have gone.

@@ -39,6 +39,19 @@ pub enum Criterion {
     SphereSize,
 }
 
+/// Whether whatever view wants `inner` must want `outer` too: the outer sphere contains the inner and has no less
+/// error, with room for the rounding of the predicate.
+#[must_use]
+pub fn is_nested(inner: &Bounds, outer: &Bounds) -> bool {
+    if inner == outer {
+        return true;
+    }
+    let center = |bounds: &Bounds| glam::DVec3::from(bounds.center.map(f64::from));
+    let room = f64::from(outer.radius) - f64::from(inner.radius) - center(inner).distance(center(outer));
+    // Half of the relative slack that construction leaves.
+    room >= f64::from(outer.radius) * 2.0_f64.powi(-21) && outer.eps >= inner.eps
+}
+
 /// Shares of a numerator that a time bound gives up, so that rounding never makes it late.
 const SLACK: f64 = 1e-9;
 

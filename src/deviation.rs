@@ -284,6 +284,34 @@ fn normal([a, b, c]: [DVec3; 3]) -> DVec3 {
 }
 
 #[cfg(feature = "cli")]
+impl std::fmt::Display for Deviation {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        writeln!(
+            f,
+            "{} triangles displayed, {} in view, {} of these flipped, {} without area; pixels of {} lines:",
+            self.triangles,
+            self.triangles_in_view,
+            self.flipped_triangles,
+            self.degenerate_triangles,
+            self.lines
+        )?;
+        writeln!(f, "{:40} {:>9} {:>9} {:>9} {:>9}", "", "samples", "median", "99 %", "largest")?;
+        for (name, figures) in [
+            ("original to displayed", &self.forward.inner),
+            ("displayed to original", &self.reverse.inner),
+            ("original to displayed, at the border", &self.forward.border),
+            ("displayed to original, at the border", &self.reverse.border),
+        ] {
+            writeln!(
+                f,
+                "{name:40} {:>9} {:>9.3} {:>9.3} {:>9.3}",
+                figures.count, figures.median, figures.p99, figures.max
+            )?;
+        }
+        Ok(())
+    }
+}
+
 impl Deviation {
     /// The figures as a JSON object with the names of the fields.
     #[must_use]

@@ -6,6 +6,7 @@
 //! so nodes that were never in play cost address space only; and as backends number nodes depth-first, a traversal
 //! reads it in sequence.
 
+use slab::Slab;
 use vertex_tree::{Bounds, NodeId, VertexTree};
 
 /// A node's record: half a cache line.
@@ -13,52 +14,48 @@ use vertex_tree::{Bounds, NodeId, VertexTree};
 #[repr(C)]
 struct Record {
     bounds: Bounds,
-    /// [`FOLDED`], [`ACTIVE_WITHOUT_CHILDREN`], or a node number plus [`FIRST_CHILD`].
+    /// While active: the children linked below the node, as numbers plus 1, 0 for none. With [`MANY`], the first is
+    /// an index into [`Front::many`] instead.
+    children: [u32; 2],
+    /// [`ACTIVE`], [`MANY`], and how many structural children are active.
     status: u32,
-    /// Next child of the same first parent: a node number plus 1, or 0.
-    next_sibling: u32,
-    /// How many structural children are active.
-    active_children: u32,
 }
 
-const FOLDED: u32 = 0;
-const ACTIVE_WITHOUT_CHILDREN: u32 = 1;
-const FIRST_CHILD: u32 = 2;
+const ACTIVE: u32 = 1 << 31;
+const MANY: u32 = 1 << 30;
+const ACTIVE_CHILDREN: u32 = MANY - 1;
 
 /// The nodes in play.
 pub struct Front {
     records: Vec<Record>,
+    /// Children of the nodes that have more than two, as they do in a multi-triangulation.
+    many: Slab<Vec<NodeId>>,
     active: usize,
     hash: u64,
 }
 
-/// What top-down traversal reads of a node in one go.
-pub(crate) struct Visit {
-    pub bounds: Bounds,
-    pub active: bool,
-    /// First child, if the node is active and has one.
-    pub first_child: Option<NodeId>,
-    pub next_sibling: Option<NodeId>,
-}
-
 impl Front {
     pub(crate) fn new(node_limit: u32) -> Self {
-        Self { records: bytemuck::allocation::zeroed_vec(node_limit as usize), active: 0, hash: 0 }
+        Self {
+            records: bytemuck::allocation::zeroed_vec(node_limit as usize),
+            many: Slab::new(),
+            active: 0,
+            hash: 0,
+        }
     }
 
     /// Whether the node is unfolded.
     #[inline]
     #[must_use]
     pub fn is_active(&self, node: NodeId) -> bool {
-        self.records[node.index()].status != FOLDED
+        self.records[node.index()].status & ACTIVE != 0
     }
 
     /// Whether the node is unfolded and can be folded next: all its structural children are folded.
     #[inline]
     #[must_use]
     pub fn is_collapsible(&self, node: NodeId) -> bool {
-        let record = &self.records[node.index()];
-        record.status != FOLDED && record.active_children == 0
+        self.records[node.index()].status & (ACTIVE | ACTIVE_CHILDREN) == ACTIVE
     }
 
     /// Whether the node is folded and can be unfolded next: all its structural parents are active.
@@ -88,15 +85,21 @@ impl Front {
         self.hash
     }
 
+    /// Sphere and error of a node in play, and whether it is active, in one access; appends the nodes linked below it
+    /// to `below`.
     #[inline(always)]
-    pub(crate) fn visit(&self, node: NodeId) -> Visit {
+    pub(crate) fn visit(&self, node: NodeId, below: &mut Vec<NodeId>) -> (&Bounds, bool) {
         let record = &self.records[node.index()];
-        Visit {
-            bounds: record.bounds,
-            active: record.status != FOLDED,
-            first_child: (record.status >= FIRST_CHILD).then(|| NodeId(record.status - FIRST_CHILD)),
-            next_sibling: record.next_sibling.checked_sub(1).map(NodeId),
+        if record.status & MANY == 0 {
+            for child in record.children {
+                if child != 0 {
+                    below.push(NodeId(child - 1));
+                }
+            }
+        } else {
+            below.extend_from_slice(&self.many[record.children[0] as usize]);
         }
+        (&record.bounds, record.status & ACTIVE != 0)
     }
 
     /// A root comes into play.
@@ -106,18 +109,29 @@ impl Front {
 
     /// Records that `node` has been unfolded, and that its children come into play.
     pub(crate) fn set_active<T: VertexTree>(&mut self, tree: &T, node: NodeId) {
-        let mut first = ACTIVE_WITHOUT_CHILDREN;
         // Each child is linked below its first parent alone: a spanning tree, where the structure is a graph.
-        for child in tree.children(node).filter(|&c| tree.parents(c).next() == Some(node)) {
-            let next_sibling = if first == ACTIVE_WITHOUT_CHILDREN { 0 } else { first - FIRST_CHILD + 1 };
-            let record = &mut self.records[child.index()];
-            record.bounds = tree.bounds(child);
-            record.next_sibling = next_sibling;
-            first = child.0 + FIRST_CHILD;
+        let mut children = [0; 2];
+        let mut count = 0;
+        for child in tree.children(node) {
+            if tree.parents(child).next() != Some(node) {
+                continue;
+            }
+            self.records[child.index()].bounds = tree.bounds(child);
+            if let Some(place) = children.get_mut(count) {
+                *place = child.0 + 1;
+            }
+            count += 1;
         }
-        self.records[node.index()].status = first;
+        let record = &mut self.records[node.index()];
+        record.status = ACTIVE;
+        if count > children.len() {
+            let linked = tree.children(node).filter(|&c| tree.parents(c).next() == Some(node)).collect();
+            record.status |= MANY;
+            children = [self.many.insert(linked) as u32, 0];
+        }
+        record.children = children;
         for parent in tree.parents(node) {
-            self.records[parent.index()].active_children += 1;
+            self.records[parent.index()].status += 1;
         }
         self.active += 1;
         self.hash = self.hash.wrapping_add(mix(tree.log_number(node)));
@@ -125,9 +139,14 @@ impl Front {
 
     /// Records that `node` has been folded.
     pub(crate) fn set_folded<T: VertexTree>(&mut self, tree: &T, node: NodeId) {
-        self.records[node.index()].status = FOLDED;
+        let record = &mut self.records[node.index()];
+        if record.status & MANY != 0 {
+            self.many.remove(record.children[0] as usize);
+        }
+        record.status = 0;
+        record.children = [0; 2];
         for parent in tree.parents(node) {
-            self.records[parent.index()].active_children -= 1;
+            self.records[parent.index()].status -= 1;
         }
         self.active -= 1;
         self.hash = self.hash.wrapping_sub(mix(tree.log_number(node)));
@@ -137,12 +156,9 @@ impl Front {
     pub fn for_each_active(&self, roots: &[NodeId], mut f: impl FnMut(NodeId)) {
         let mut stack = roots.to_vec();
         while let Some(node) = stack.pop() {
-            let visit = self.visit(node);
-            if visit.active {
+            if self.visit(node, &mut stack).1 {
                 f(node);
             }
-            stack.extend(visit.next_sibling);
-            stack.extend(visit.first_child);
         }
     }
 }

@@ -3,6 +3,10 @@
 pub mod active_mesh;
 pub mod budget;
 pub mod bvh;
+#[cfg(feature = "cli")]
+pub mod cli;
+#[cfg(feature = "cli")]
+pub mod compare;
 pub mod criterion;
 pub mod cut;
 pub mod deviation;
@@ -21,6 +25,8 @@ pub mod progress;
 pub mod queue;
 pub mod refine;
 pub mod render;
+#[cfg(feature = "cli")]
+pub mod report;
 pub mod scene;
 pub mod simplify;
 pub mod view;

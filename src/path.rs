@@ -4,6 +4,7 @@
 //! eye position in object space, and the rotation from camera space (looking along -z, y up) to object space. Lines
 //! that start with `#` before the frames are the header. See [`Path::parse`].
 
+mod around;
 mod director;
 mod format;
 mod generate;
@@ -12,6 +13,7 @@ mod summary;
 
 use glam::{DQuat, DVec3};
 
+pub use around::around;
 pub use format::PathError;
 pub use generate::{generate, recorded};
 pub use summary::{Motion, Summary};

@@ -275,9 +275,10 @@ fn positive(text: &str) -> Result<f64, String> {
 }
 
 fn strategy(text: &str) -> Result<Strategy, String> {
-    Strategy::ALL.into_iter().find(|s| s.name() == text).ok_or_else(|| {
-        format!("one of {} is expected", Strategy::ALL.map(Strategy::name).join(", "))
-    })
+    Strategy::ALL
+        .into_iter()
+        .find(|s| s.name() == text)
+        .ok_or_else(|| format!("one of {} is expected", Strategy::ALL.map(Strategy::name).join(", ")))
 }
 
 /// `A..B`, either of which may be missing.

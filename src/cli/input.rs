@@ -59,7 +59,8 @@ impl Input {
 
     /// A short name for tables and file names.
     pub fn name(&self) -> String {
-        let stem = |path: &Path| path.file_stem().map_or_else(String::new, |s| s.to_string_lossy().into_owned());
+        let stem =
+            |path: &Path| path.file_stem().map_or_else(String::new, |s| s.to_string_lossy().into_owned());
         match self {
             Self::Scene(scene) => scene.to_string().trim_start_matches("scene:").to_owned(),
             Self::Log(path) => stem(path),
@@ -85,7 +86,8 @@ impl Input {
         }
         let mesh = self.mesh()?;
         let options = simplify::Options {
-            merge_components: merge_components || matches!(self, Self::Scene(scene) if scene.is_many_objects()),
+            merge_components: merge_components
+                || matches!(self, Self::Scene(scene) if scene.is_many_objects()),
         };
         let built = stage(&format!("{}: building the hierarchy", self.name()), |p| {
             simplify::build(mesh, &options, p)

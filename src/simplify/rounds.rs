@@ -182,7 +182,7 @@ impl Builder {
         let triangles = &mut self.surface.triangles;
         self.samples.finish(|t, list| triangles[t as usize].samples = list);
         let carried = self.quadrics[v as usize];
-        self.quadrics[u as usize].absorb(&carried, from - to);
+        self.quadrics[u as usize].absorb(&carried, to - from);
     }
 
     /// Distance of the sample points around `v`, and `v` itself, from what takes the place of its star.
