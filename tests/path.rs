@@ -53,7 +53,7 @@ fn errors_name_file_line_and_value() {
 proptest! {
     #[test]
     fn what_was_written_is_read_to_the_bit(
-        fov_y in 0.01..3.14,
+        fov_y in 0.01..3.1,
         aspect in 0.1..10.0,
         rows in prop::collection::vec((0.001..1.0, prop::array::uniform3(-1e9..1e9), prop::array::uniform4(-1.0..1.0)), 1..20),
     ) {
