@@ -13,11 +13,13 @@ use super::legality::{keeps_orientation, keeps_topology};
 use super::nodes::{Nodes, round_up};
 use super::quadric::Quadric;
 use super::samples::Samples;
+use super::closest::Face;
 use super::surface::{Marks, Spoke, Surface};
 use crate::progress::Progress;
 
 /// The part of the candidates that a round takes up.
 const SHARE: f64 = 0.5;
+const BLOCK: usize = 4096;
 
 /// Everything that changes while a mesh is being simplified.
 #[derive(Debug)]
@@ -34,6 +36,7 @@ pub(super) struct Builder {
     pub inversions: u32,
     pub highest_key: f32,
     pub share: f64,
+    pub reverse_mode: u32,
     star: Vec<Spoke>,
 }
 
@@ -52,6 +55,7 @@ impl Builder {
             inversions: 0,
             highest_key: 0.0,
             share: std::env::var("SHARE").ok().and_then(|s| s.parse().ok()).unwrap_or(SHARE),
+            reverse_mode: std::env::var("REV").ok().and_then(|s| s.parse().ok()).unwrap_or(1),
             star: Vec::new(),
         }
     }
@@ -64,30 +68,28 @@ impl Builder {
         loop {
             progress(all - self.surface.live.len() as u64, all);
             self.refresh_candidates(last_chance);
-            // Keys are not negative, so their bits sort as they do; ties go by vertex number.
-            order.clear();
-            for &v in &self.surface.live {
-                if self.candidates.state[v as usize] != State::Nothing {
-                    order.push(u64::from(self.candidates.key[v as usize].to_bits()) << 32 | u64::from(v));
-                }
-            }
-            if order.is_empty() {
+            let Some(limit) = self.key_limit(&mut order) else {
                 if last_chance {
                     return;
                 }
                 last_chance = true;
                 continue;
-            }
+            };
             last_chance = false;
-            let take = ((order.len() as f64 * self.share) as usize).max(order.len().min(16));
-            if take < order.len() {
-                order.select_nth_unstable(take);
-                order.truncate(take);
-            }
-            order.sort_unstable();
             self.first_of_round = self.nodes.next();
-            for &entry in &order {
-                self.attempt(entry as u32);
+            for block in 0..self.surface.live.len().div_ceil(BLOCK) {
+                let range = block * BLOCK..self.surface.live.len().min((block + 1) * BLOCK);
+                order.clear();
+                for &v in &self.surface.live[range] {
+                    let key = self.candidates.key[v as usize];
+                    if self.candidates.state[v as usize] != State::Nothing && key <= limit {
+                        order.push(u64::from(key.to_bits()) << 32 | u64::from(v));
+                    }
+                }
+                order.sort_unstable();
+                for &entry in &order {
+                    self.attempt(entry as u32);
+                }
             }
             if self.nodes.next() > self.first_of_round {
                 self.rounds += 1;
@@ -115,6 +117,16 @@ impl Builder {
         }
     }
 
+    /// The key up to which candidates are taken up in this round.
+    fn key_limit(&self, keys: &mut Vec<u64>) -> Option<f32> {
+        keys.clear();
+        // Keys are not negative, so their bits sort as they do.
+        keys.extend(self.surface.live.iter().filter(|&&v| self.candidates.state[v as usize] != State::Nothing).map(|&v| u64::from(self.candidates.key[v as usize].to_bits())));
+        let take = ((keys.len() as f64 * self.share) as usize).max(keys.len().min(16)).checked_sub(1)?;
+        let (_, &mut limit, _) = keys.select_nth_unstable(take);
+        Some(f32::from_bits(limit as u32))
+    }
+
     fn is_of_round(&self, node: u32) -> bool {
         node != NONE && node >= self.first_of_round
     }
@@ -122,14 +134,9 @@ impl Builder {
     /// Makes the collapse of `v`'s candidate if nothing near has changed in this round and it is legal.
     fn attempt(&mut self, v: u32) {
         let u = self.candidates.target[v as usize];
-        if self.is_of_round(self.nodes.top[v as usize]) || self.is_of_round(self.nodes.top[u as usize]) {
+        // Whatever has changed around `v` in this round has left its mark there.
+        if self.candidates.state[v as usize] == State::Outdated || self.is_of_round(self.nodes.top[u as usize]) {
             return;
-        }
-        for &t in self.surface.star(v) {
-            let t = &self.surface.triangles[t as usize];
-            if !t.is_alive() || self.is_of_round(t.creator) {
-                return;
-            }
         }
         self.star.clear();
         self.star.extend(self.surface.spokes(v));
@@ -217,7 +224,24 @@ impl Builder {
                 samples.place_list(list, &surface.positions, special, to);
             }
         }
-        samples.error()
+        let forward = samples.error();
+        let mode = self.reverse_mode;
+        let mut worst = 0.0_f32;
+        if mode > 0 {
+            let from = surface.position(v);
+            let olds: Vec<Face> = self.star.iter().map(|s| Face::new(from, surface.position(s.next), surface.position(s.last))).collect();
+            let mut test = |p: Vec3| {
+                let d = olds.iter().fold(f32::INFINITY, |d, f| d.min(f.distance_squared(p)));
+                worst = worst.max(d);
+            };
+            for s in &self.star {
+                if s.next == u || s.last == u { continue; }
+                let (a, b) = (surface.position(s.next), surface.position(s.last));
+                test((to + a) * 0.5);
+                if mode > 1 { test((to + a + b) / 3.0); }
+            }
+        }
+        forward.max(worst.sqrt())
     }
 }
 
