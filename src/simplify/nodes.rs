@@ -90,7 +90,7 @@ impl Nodes {
             eps = eps.max(b.eps);
             depth = depth.max(self.depth[node as usize]);
         }
-        let center = enclosing_center(&self.balls).as_vec3();
+        let center = enclosing_center(&mut self.balls).as_vec3();
         let radius = radius_around(center.as_dvec3(), &self.balls);
         let radius = round_up((radius + self.slack) * (1.0 + RELATIVE_SLACK));
         self.top[kept as usize] = self.next();
