@@ -20,7 +20,7 @@ use crate::progress::Progress;
 use nodes::{Nodes, round_up};
 use quadric::Quadric;
 use rounds::Builder;
-use surface::Surface;
+use surface::{Marks, Surface};
 
 /// How to simplify.
 #[derive(Clone, Debug, Default, PartialEq)]
@@ -85,27 +85,12 @@ pub fn build(mesh: Mesh, _options: &Options, progress: Progress) -> Result<(Coll
         number[old as usize] = new;
     }
     let positions: Vec<Vec3> = order.iter().map(|&old| scaled[old as usize]).collect();
-    let mut leaf_radius = vec![0.0_f32; positions.len()];
-    let mut corners: Vec<[u32; 3]> = Vec::with_capacity(mesh.triangles.len());
-    for triangle in &mesh.triangles {
-        let [a, b, c] = triangle.map(|v| number[v as usize]);
-        for (v, w) in [(a, b), (b, c), (c, a)] {
-            let length =
-                positions[v as usize].as_dvec3().distance(positions[w as usize].as_dvec3()) * (1.0 + 1e-15);
-            let length = round_up(length);
-            leaf_radius[v as usize] = leaf_radius[v as usize].max(length);
-            leaf_radius[w as usize] = leaf_radius[w as usize].max(length);
-        }
-        if a != b && b != c && c != a {
-            corners.push([a, b, c]);
-        }
-    }
-    corners.sort_by_key(|&[a, b, c]| a.min(b).min(c));
-    let surface = Surface::new(positions, corners.iter().copied());
-    drop(corners);
-    let quadrics = initial_quadrics(&surface);
+    let leaf_radius = leaf_radii(&mesh.triangles, &number, &positions);
+    let surface = Surface::new(positions, &coherent_triangles(&mesh.triangles, &number));
+    let mut marks = Marks::new(order.len());
+    let (quadrics, special) = initial_quadrics(&surface, &mut marks);
     let nodes = Nodes::new(leaf_radius, extent / scale);
-    let mut builder = Builder::new(surface, quadrics, nodes);
+    let mut builder = Builder::new(surface, quadrics, special, nodes, marks);
     let preparation = start.elapsed();
 
     let start = Instant::now();
@@ -149,32 +134,76 @@ pub fn build(mesh: Mesh, _options: &Options, progress: Progress) -> Result<(Coll
 /// Weight of a plane that holds a boundary edge in place, per squared length of the edge.
 const BOUNDARY_WEIGHT: f32 = 4.0;
 
+/// For each vertex in the new numbering, its distance to the farthest corner of its triangles.
+fn leaf_radii(triangles: &[[u32; 3]], number: &[u32], positions: &[Vec3]) -> Vec<f32> {
+    let mut farthest = vec![0.0_f64; positions.len()];
+    for triangle in triangles {
+        let [a, b, c] = triangle.map(|v| number[v as usize] as usize);
+        for (v, w) in [(a, b), (b, c), (c, a)] {
+            let squared = positions[v].as_dvec3().distance_squared(positions[w].as_dvec3());
+            farthest[v] = farthest[v].max(squared);
+            farthest[w] = farthest[w].max(squared);
+        }
+    }
+    farthest.into_iter().map(|squared| round_up(squared.sqrt() * (1.0 + 1e-15))).collect()
+}
+
+/// The triangles with three different corners in the new numbering, in the order of their lowest vertices.
+fn coherent_triangles(triangles: &[[u32; 3]], number: &[u32]) -> Vec<[u32; 3]> {
+    let renumbered = || {
+        triangles
+            .iter()
+            .map(|t| t.map(|v| number[v as usize]))
+            .filter(|&[a, b, c]| a != b && b != c && c != a)
+    };
+    let lowest = |[a, b, c]: [u32; 3]| a.min(b).min(c) as usize;
+    let mut place = vec![0_usize; number.len() + 1];
+    for t in renumbered() {
+        place[lowest(t) + 1] += 1;
+    }
+    for v in 1..place.len() {
+        place[v] += place[v - 1];
+    }
+    let mut ordered = vec![[0; 3]; place.last().copied().unwrap_or(0)];
+    for t in renumbered() {
+        let slot = &mut place[lowest(t)];
+        ordered[*slot] = t;
+        *slot += 1;
+    }
+    ordered
+}
+
 /// The planes of the triangles around each vertex, weighted by area, and at edges that do not join exactly two
-/// triangles a plane through the edge, upright on the triangle.
-fn initial_quadrics(surface: &Surface) -> Vec<Quadric> {
+/// triangles a plane through the edge, upright on the triangle. Also, which vertices have such edges.
+fn initial_quadrics(surface: &Surface, marks: &mut Marks) -> (Vec<Quadric>, Vec<bool>) {
     let mut quadrics = vec![Quadric::default(); surface.positions.len()];
     for t in &surface.triangles {
         let [a, b, c] = t.corners;
         let normal = surface.normal(a, b, c);
         let length = normal.length();
-        if length <= 0.0 {
-            continue;
-        }
-        let unit = normal / length;
-        for v in t.corners {
-            quadrics[v as usize].add_plane(unit, 0.5 * length, 0.5 * length);
-        }
-        for (v, w) in [(a, b), (b, c), (c, a)] {
-            // Of a pair of triangles at an edge, one lists its vertices in ascending order as a rule.
-            let count = surface.spokes(v).filter(|s| s.next == w || s.last == w).count();
-            if count != 2 {
-                let edge = surface.position(w) - surface.position(v);
-                let upright = edge.cross(unit).normalize_or_zero();
-                let weight = BOUNDARY_WEIGHT * edge.length_squared();
-                quadrics[v as usize].add_plane(upright, weight, 0.0);
-                quadrics[w as usize].add_plane(upright, weight, 0.0);
+        if length > 0.0 {
+            for v in t.corners {
+                quadrics[v as usize].add_plane(normal / length, 0.5 * length, 0.5 * length);
             }
         }
     }
-    quadrics
+    let mut special = vec![false; quadrics.len()];
+    let mut neighbours = Vec::new();
+    for v in 0..special.len() as u32 {
+        if surface.is_surrounded(v) {
+            continue;
+        }
+        surface.neighbours(v, marks, &mut neighbours);
+        for &(w, _) in neighbours.iter().filter(|&&(_, triangles)| triangles != 2) {
+            special[v as usize] = true;
+            let edge = surface.position(w) - surface.position(v);
+            let weight = BOUNDARY_WEIGHT * edge.length_squared();
+            for s in surface.spokes(v).filter(|s| s.next == w || s.last == w) {
+                let normal = surface.normal(v, s.next, s.last);
+                let upright = edge.cross(normal).normalize_or_zero();
+                quadrics[v as usize].add_plane(upright, weight, 0.0);
+            }
+        }
+    }
+    (quadrics, special)
 }

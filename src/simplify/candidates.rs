@@ -7,6 +7,7 @@
 //! Cheap keys are kept from round to round, and found anew only where a star has changed. Whether a collapse is legal
 //! costs more and is asked when its turn comes: most candidates are overtaken by a change nearby before that.
 
+use glam::Vec3;
 use vertex_tree::NONE;
 
 use super::quadric::Quadric;
@@ -34,7 +35,8 @@ pub(super) struct Candidates {
     pub key: Vec<f32>,
     pub target: Vec<u32>,
     pub state: Vec<State>,
-    /// Whether the vertex touches an edge that does not join exactly two triangles.
+    /// Whether the vertex touches an edge that does not join exactly two triangles. Only removed vertices can rely on
+    /// it: for others it may say so until their candidate is found anew.
     pub special: Vec<bool>,
     /// The neighbours of one vertex, and the number of triangles at the edge to each.
     neighbours: Vec<(u32, u32)>,
@@ -43,12 +45,13 @@ pub(super) struct Candidates {
 }
 
 impl Candidates {
-    pub fn new(count: usize) -> Candidates {
+    pub fn new(special: Vec<bool>) -> Candidates {
+        let count = special.len();
         Candidates {
             key: vec![0.0; count],
             target: vec![NONE; count],
             state: vec![State::Outdated; count],
-            special: vec![false; count],
+            special,
             neighbours: Vec::new(),
             edges: Vec::new(),
         }
@@ -56,19 +59,7 @@ impl Candidates {
 
     /// Finds the edges along which `v` may be removed as far as `v`'s own star can say, with their keys.
     fn find_edges(&mut self, v: u32, surface: &Surface, quadrics: &[Quadric], marks: &mut Marks) {
-        self.neighbours.clear();
-        marks.clear();
-        for spoke in surface.spokes(v) {
-            for w in [spoke.next, spoke.last] {
-                match marks.get(w) {
-                    Some(i) => self.neighbours[i as usize].1 += 1,
-                    None => {
-                        marks.set(w, self.neighbours.len() as u32);
-                        self.neighbours.push((w, 1));
-                    }
-                }
-            }
-        }
+        surface.neighbours(v, marks, &mut self.neighbours);
         // A vertex on a boundary, or on a seam where more than two triangles meet, stays on it.
         let special = self.neighbours.iter().any(|&(_, triangles)| triangles != 2);
         self.special[v as usize] = special;
@@ -77,17 +68,31 @@ impl Candidates {
         for &(u, triangles) in &self.neighbours {
             if !special || triangles != 2 {
                 let d = surface.position(u) - position;
-                let key = quadrics[v as usize].error(d) + LENGTH_TERM * d.length_squared();
-                self.edges.push((key, u));
+                self.edges.push((edge_key(&quadrics[v as usize], d), u));
             }
         }
     }
 
     /// Finds the cheapest edge of `v`.
     pub fn refresh(&mut self, v: u32, surface: &Surface, quadrics: &[Quadric], marks: &mut Marks) {
-        self.find_edges(v, surface, quadrics, marks);
-        let cheapest = self.edges.iter().copied().min_by(order);
-        self.set(v, cheapest, State::Cheapest);
+        if self.special[v as usize] {
+            self.find_edges(v, surface, quadrics, marks);
+            let cheapest = self.edges.iter().copied().min_by(order);
+            self.set(v, cheapest, State::Cheapest);
+            return;
+        }
+        // The triangles close up around `v`, so every neighbour comes next in one of them. Where orientations
+        // disagree one may be missed here.
+        let (position, quadric) = (surface.position(v), &quadrics[v as usize]);
+        let (mut key, mut target) = (f32::INFINITY, NONE);
+        for spoke in surface.spokes(v) {
+            let candidate = edge_key(quadric, surface.position(spoke.next) - position);
+            if candidate < key || (candidate == key && spoke.next < target) {
+                (key, target) = (candidate, spoke.next);
+            }
+        }
+        let candidate = (target != NONE).then_some((key, target));
+        self.set(v, candidate, State::Cheapest);
     }
 
     /// Finds the cheapest edge of `v` that is legal.
@@ -114,6 +119,10 @@ impl Candidates {
         self.target[v as usize] = target;
         self.state[v as usize] = state;
     }
+}
+
+fn edge_key(quadric: &Quadric, d: Vec3) -> f32 {
+    quadric.error(d) + LENGTH_TERM * d.length_squared()
 }
 
 /// Ascending keys, ties by vertex number.

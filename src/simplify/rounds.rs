@@ -13,7 +13,6 @@ use super::legality::{keeps_orientation, keeps_topology};
 use super::nodes::{Nodes, round_up};
 use super::quadric::Quadric;
 use super::samples::Samples;
-use super::closest::Face;
 use super::surface::{Marks, Spoke, Surface};
 use crate::progress::Progress;
 
@@ -36,26 +35,24 @@ pub(super) struct Builder {
     pub inversions: u32,
     pub highest_key: f32,
     pub share: f64,
-    pub reverse_mode: u32,
     star: Vec<Spoke>,
 }
 
 impl Builder {
-    pub fn new(surface: Surface, quadrics: Vec<Quadric>, nodes: Nodes) -> Builder {
+    pub fn new(surface: Surface, quadrics: Vec<Quadric>, special: Vec<bool>, nodes: Nodes, marks: Marks) -> Builder {
         let count = surface.positions.len();
         Builder {
             surface,
             quadrics,
-            candidates: Candidates::new(count),
+            candidates: Candidates::new(special),
             samples: Samples::new(count),
             nodes,
-            marks: Marks::new(count),
+            marks,
             first_of_round: 0,
             rounds: 0,
             inversions: 0,
             highest_key: 0.0,
             share: std::env::var("SHARE").ok().and_then(|s| s.parse().ok()).unwrap_or(SHARE),
-            reverse_mode: std::env::var("REV").ok().and_then(|s| s.parse().ok()).unwrap_or(1),
             star: Vec::new(),
         }
     }
@@ -172,9 +169,12 @@ impl Builder {
         }
         self.highest_key = self.highest_key.max(key);
 
+        let was_special = self.candidates.special[v as usize];
         for spoke in &self.star {
-            self.candidates.state[spoke.next as usize] = State::Outdated;
-            self.candidates.state[spoke.last as usize] = State::Outdated;
+            for w in [spoke.next, spoke.last] {
+                self.candidates.state[w as usize] = State::Outdated;
+                self.candidates.special[w as usize] |= was_special;
+            }
             let t = &mut self.surface.triangles[spoke.triangle as usize];
             t.samples = NONE;
             if spoke.next == u || spoke.last == u {
@@ -224,24 +224,20 @@ impl Builder {
                 samples.place_list(list, &surface.positions, special, to);
             }
         }
-        let forward = samples.error();
-        let mode = self.reverse_mode;
-        let mut worst = 0.0_f32;
-        if mode > 0 {
-            let from = surface.position(v);
-            let olds: Vec<Face> = self.star.iter().map(|s| Face::new(from, surface.position(s.next), surface.position(s.last))).collect();
-            let mut test = |p: Vec3| {
-                let d = olds.iter().fold(f32::INFINITY, |d, f| d.min(f.distance_squared(p)));
-                worst = worst.max(d);
-            };
-            for s in &self.star {
-                if s.next == u || s.last == u { continue; }
-                let (a, b) = (surface.position(s.next), surface.position(s.last));
-                test((to + a) * 0.5);
-                if mode > 1 { test((to + a + b) / 3.0); }
+        let from = surface.position(v);
+        // The other way round, vertices alone say little: a new edge can pass far from the edges that it crosses, where
+        // neither has a vertex. The middles of the new edges stand for those.
+        samples.begin_reverse();
+        for s in &self.star {
+            samples.add_old_face(from, surface.position(s.next), surface.position(s.last));
+        }
+        for s in &self.star {
+            if s.next != u && s.last != u {
+                // Its other edge from `u` is the next triangle's, or was there before.
+                samples.place_reverse((to + surface.position(s.next)) * 0.5);
             }
         }
-        forward.max(worst.sqrt())
+        samples.error()
     }
 }
 

@@ -37,6 +37,9 @@ pub(super) struct Samples {
     /// Edges that the points of special edges must stay close to, and the face that gets them.
     edges: Vec<(u32, Vec3, Vec3)>,
     placed: Vec<Placed>,
+    old_faces: Vec<Face>,
+    /// Largest squared distance so far.
+    worst: f32,
     counts: Vec<u32>,
 }
 
@@ -47,6 +50,8 @@ impl Samples {
             faces: Vec::new(),
             edges: Vec::new(),
             placed: Vec::new(),
+            old_faces: Vec::new(),
+            worst: 0.0,
             counts: Vec::new(),
         }
     }
@@ -107,9 +112,32 @@ impl Samples {
         self.placed.push(placed);
     }
 
+    /// Starts to measure what is new against what was there.
+    pub fn begin_reverse(&mut self) {
+        self.old_faces.clear();
+        self.worst = self.placed.iter().fold(0.0, |worst, p| p.distance_squared.max(worst));
+    }
+
+    /// Adds a triangle that was there before the collapse.
+    pub fn add_old_face(&mut self, a: Vec3, b: Vec3, c: Vec3) {
+        self.old_faces.push(Face::new(a, b, c));
+    }
+
+    /// Measures a point of what is there after the collapse.
+    pub fn place_reverse(&mut self, p: Vec3) {
+        let mut nearest = f32::INFINITY;
+        for face in &self.old_faces {
+            nearest = nearest.min(face.distance_squared(p));
+            if nearest <= self.worst {
+                return;
+            }
+        }
+        self.worst = nearest;
+    }
+
     /// The largest distance of a point that was placed.
     pub fn error(&self) -> f32 {
-        self.placed.iter().fold(0.0, |worst: f32, p| worst.max(p.distance_squared)).sqrt()
+        self.worst.sqrt()
     }
 
     /// Hands the points to their triangles. `set_list` is called once for every triangle that was added.

@@ -44,10 +44,10 @@ pub(super) struct Spoke {
 
 impl Surface {
     /// `triangles` must have three different corners each.
-    pub fn new(positions: Vec<Vec3>, corners: impl Iterator<Item = [u32; 3]>) -> Surface {
+    pub fn new(positions: Vec<Vec3>, corners: &[[u32; 3]]) -> Surface {
         let count = positions.len();
         let triangles: Vec<Triangle> =
-            corners.map(|corners| Triangle { corners, creator: NONE, samples: NONE }).collect();
+            corners.iter().map(|&corners| Triangle { corners, creator: NONE, samples: NONE }).collect();
         let mut surface = Surface {
             positions,
             triangles,
@@ -113,6 +113,41 @@ impl Surface {
                 None
             }
         })
+    }
+
+    /// Whether the triangles around `v` close up: each neighbour comes next in one of them and last in another. A
+    /// vertex of a few dozen triangles or more is not looked at, and the answer is no.
+    pub fn is_surrounded(&self, v: u32) -> bool {
+        const MOST: usize = 24;
+        let (mut next, mut last) = ([0; MOST], [0; MOST]);
+        let count = self.star(v).len();
+        if count > MOST {
+            return false;
+        }
+        for (i, spoke) in self.spokes(v).enumerate() {
+            (next[i], last[i]) = (spoke.next, spoke.last);
+        }
+        let occurrences = |list: &[u32], w: u32| list.iter().filter(|&&x| x == w).count();
+        next[..count]
+            .iter()
+            .all(|&w| occurrences(&last[..count], w) == 1 && occurrences(&next[..count], w) == 1)
+    }
+
+    /// Finds the neighbours of `v`, and the number of triangles at the edge to each.
+    pub fn neighbours(&self, v: u32, marks: &mut Marks, neighbours: &mut Vec<(u32, u32)>) {
+        neighbours.clear();
+        marks.clear();
+        for spoke in self.spokes(v) {
+            for w in [spoke.next, spoke.last] {
+                match marks.get(w) {
+                    Some(i) => neighbours[i as usize].1 += 1,
+                    None => {
+                        marks.set(w, neighbours.len() as u32);
+                        neighbours.push((w, 1));
+                    }
+                }
+            }
+        }
     }
 
     pub fn position(&self, v: u32) -> Vec3 {
