@@ -2,25 +2,27 @@
 
 mod ball;
 mod candidates;
-mod closest;
+mod fan;
 mod legality;
+mod marks;
 mod nodes;
 mod quadric;
 mod rounds;
 mod samples;
 mod spatial_order;
 mod surface;
+mod virtual_edges;
 
 use std::time::{Duration, Instant};
 
 use glam::{DVec3, Vec3};
-use vertex_tree::{Collapse, CollapseLog, LogError, Mesh};
+use vertex_tree::{Bounds, Collapse, CollapseLog, LogError, Mesh};
 
 use crate::progress::Progress;
+use marks::Marks;
 use nodes::{Nodes, round_up};
-use quadric::Quadric;
 use rounds::Builder;
-use surface::{Marks, Surface};
+use surface::Surface;
 
 /// How to simplify.
 #[derive(Clone, Debug, Default, PartialEq)]
@@ -40,7 +42,7 @@ pub struct Report {
     /// Collapses made.
     pub collapses: usize,
     /// Rounds of independent collapses.
-    pub rounds: u32,
+    pub rounds: usize,
     /// Roots of the forest.
     pub roots: usize,
     /// Depth of the forest.
@@ -52,7 +54,7 @@ pub struct Report {
     /// The largest error of a node, in object units.
     pub largest_eps: f32,
     /// Collapses whose key was less than that of an earlier one.
-    pub inversions: u32,
+    pub inversions: usize,
     /// Time to prepare: renumbering, quadrics.
     pub preparation: Duration,
     /// Time of the rounds.
@@ -65,7 +67,7 @@ pub struct Report {
 ///
 /// # Errors
 /// If a triangle names a vertex that is not there or a coordinate is not finite.
-pub fn build(mesh: Mesh, _options: &Options, progress: Progress) -> Result<(CollapseLog, Report), LogError> {
+pub fn build(mesh: Mesh, options: &Options, progress: Progress) -> Result<(CollapseLog, Report), LogError> {
     let start = Instant::now();
     let mut log = CollapseLog { mesh, collapses: Vec::new() };
     log.forest()?;
@@ -86,11 +88,11 @@ pub fn build(mesh: Mesh, _options: &Options, progress: Progress) -> Result<(Coll
     }
     let positions: Vec<Vec3> = order.iter().map(|&old| scaled[old as usize]).collect();
     let leaf_radius = leaf_radii(&mesh.triangles, &number, &positions);
-    let surface = Surface::new(positions, &coherent_triangles(&mesh.triangles, &number));
+    let mut surface = Surface::new(positions, &coherent_triangles(&mesh.triangles, &number));
     let mut marks = Marks::new(order.len());
-    let (quadrics, special) = initial_quadrics(&surface, &mut marks);
+    set_initial_quadrics(&mut surface, &mut marks);
     let nodes = Nodes::new(leaf_radius, extent / scale);
-    let mut builder = Builder::new(surface, quadrics, special, nodes, marks);
+    let mut builder = Builder::new(surface, nodes, marks, options.merge_components);
     let preparation = start.elapsed();
 
     let start = Instant::now();
@@ -98,37 +100,57 @@ pub fn build(mesh: Mesh, _options: &Options, progress: Progress) -> Result<(Coll
     let simplification = start.elapsed();
 
     let start = Instant::now();
-    let back = |v: u32| order[v as usize];
-    let unscale = |x: f32| (f64::from(x) * scale) as f32;
-    let clamped = |x: f32| unscale(x).min(f32::MAX);
-    log.collapses = builder
-        .nodes
-        .collapses
-        .iter()
-        .map(|c| {
-            let mut bounds = c.bounds;
-            bounds.center = bounds.center.map(unscale);
-            bounds.radius = clamped(bounds.radius);
-            bounds.eps = clamped(bounds.eps);
-            Collapse { removed: back(c.removed), kept: back(c.kept), bounds }
-        })
-        .collect();
+    let nodes = &builder.nodes;
+    let (sequence, inversions) = sequence(&nodes.keys, &builder.rounds);
+    let unscaled = |x: f32| ((f64::from(x) * scale) as f32).min(f32::MAX);
+    let collapses = sequence.iter().map(|&node| {
+        let c = nodes.collapses[node as usize];
+        Collapse {
+            removed: order[c.removed as usize],
+            kept: order[c.kept as usize],
+            bounds: Bounds {
+                center: c.bounds.center.map(unscaled),
+                radius: unscaled(c.bounds.radius),
+                eps: unscaled(c.bounds.eps),
+            },
+        }
+    });
+    log.collapses = collapses.collect();
     let forest = log.forest()?;
     let report = Report {
         triangles: log.mesh.triangles.len(),
         collapses: log.collapses.len(),
-        rounds: builder.rounds,
+        rounds: builder.rounds.len(),
         roots: forest.roots().count(),
         tree_depth: forest.depth(),
-        dependency_depth: builder.nodes.depth.iter().copied().max().unwrap_or(0),
-        base_triangles: builder.surface.triangles.len(),
-        largest_eps: log.collapses.iter().fold(0.0, |m, c| m.max(c.bounds.eps)),
-        inversions: builder.inversions,
+        dependency_depth: nodes.depth.iter().copied().max().unwrap_or(0),
+        base_triangles: builder.surface.live_triangles,
+        largest_eps: log.collapses.iter().fold(0.0, |largest, c| c.bounds.eps.max(largest)),
+        inversions,
         preparation,
         simplification,
         conclusion: start.elapsed(),
     };
     Ok((log, report))
+}
+
+/// The nodes of each round in ascending order of keys, and the number of those whose key is less than an earlier one's.
+fn sequence(keys: &[f32], rounds: &[u32]) -> (Vec<u32>, usize) {
+    let mut sequence: Vec<u32> = (0..keys.len() as u32).collect();
+    let ends = rounds.iter().skip(1).copied().chain([keys.len() as u32]);
+    for (&start, end) in rounds.iter().zip(ends) {
+        sequence[start as usize..end as usize]
+            .sort_unstable_by(|&a, &b| keys[a as usize].total_cmp(&keys[b as usize]).then(a.cmp(&b)));
+    }
+    let (mut highest, mut inversions) = (0.0, 0);
+    for &node in &sequence {
+        let key = keys[node as usize];
+        if key < highest {
+            inversions += 1;
+        }
+        highest = key.max(highest);
+    }
+    (sequence, inversions)
 }
 
 /// Weight of a plane that holds a boundary edge in place, per squared length of the edge.
@@ -173,37 +195,36 @@ fn coherent_triangles(triangles: &[[u32; 3]], number: &[u32]) -> Vec<[u32; 3]> {
     ordered
 }
 
-/// The planes of the triangles around each vertex, weighted by area, and at edges that do not join exactly two
-/// triangles a plane through the edge, upright on the triangle. Also, which vertices have such edges.
-fn initial_quadrics(surface: &Surface, marks: &mut Marks) -> (Vec<Quadric>, Vec<bool>) {
-    let mut quadrics = vec![Quadric::default(); surface.positions.len()];
-    for t in &surface.triangles {
-        let [a, b, c] = t.corners;
+/// Gives each vertex the planes of the triangles around it, weighted by area, and at edges that do not join exactly
+/// two triangles a plane through the edge, upright on the triangle. Also finds which vertices have such edges.
+fn set_initial_quadrics(surface: &mut Surface, marks: &mut Marks) {
+    for i in 0..surface.triangles.len() {
+        let corners @ [a, b, c] = surface.triangles[i].corners;
         let normal = surface.normal(a, b, c);
         let length = normal.length();
         if length > 0.0 {
-            for v in t.corners {
-                quadrics[v as usize].add_plane(normal / length, 0.5 * length, 0.5 * length);
+            for v in corners {
+                surface.quadrics[v as usize].add_plane(normal / length, 0.5 * length, 0.5 * length);
             }
         }
     }
-    let mut special = vec![false; quadrics.len()];
     let mut neighbours = Vec::new();
-    for v in 0..special.len() as u32 {
+    for i in 0..surface.live.len() {
+        let v = surface.live[i];
         if surface.is_surrounded(v) {
             continue;
         }
         surface.neighbours(v, marks, &mut neighbours);
+        let mut quadric = surface.quadrics[v as usize];
         for &(w, _) in neighbours.iter().filter(|&&(_, triangles)| triangles != 2) {
-            special[v as usize] = true;
+            surface.special[v as usize] = true;
             let edge = surface.position(w) - surface.position(v);
             let weight = BOUNDARY_WEIGHT * edge.length_squared();
-            for s in surface.spokes(v).filter(|s| s.next == w || s.last == w) {
-                let normal = surface.normal(v, s.next, s.last);
-                let upright = edge.cross(normal).normalize_or_zero();
-                quadrics[v as usize].add_plane(upright, weight, 0.0);
+            for s in surface.spokes(v).filter(|s| s.touches(w)) {
+                let upright = edge.cross(surface.normal(v, s.next, s.last)).normalize_or_zero();
+                quadric.add_plane(upright, weight, 0.0);
             }
         }
+        surface.quadrics[v as usize] = quadric;
     }
-    (quadrics, special)
 }
