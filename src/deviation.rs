@@ -283,7 +283,6 @@ fn normal([a, b, c]: [DVec3; 3]) -> DVec3 {
     (b - a).cross(c - a)
 }
 
-#[cfg(feature = "cli")]
 impl std::fmt::Display for Deviation {
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
         writeln!(
@@ -312,6 +311,7 @@ impl std::fmt::Display for Deviation {
     }
 }
 
+#[cfg(feature = "cli")]
 impl Deviation {
     /// The figures as a JSON object with the names of the fields.
     #[must_use]

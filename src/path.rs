@@ -8,7 +8,7 @@ mod around;
 mod director;
 mod format;
 mod generate;
-// pub mod import;
+pub mod import;
 mod summary;
 
 use glam::{DQuat, DVec3};

@@ -7,6 +7,7 @@ use std::time::Duration;
 use clap::{Args, Parser, Subcommand, ValueEnum};
 
 use crate::criterion::Criterion;
+use crate::path::import;
 use crate::refine::Strategy;
 
 /// Event-driven view-dependent level of detail: build hierarchies, replay walkthroughs, compare strategies.
@@ -201,6 +202,16 @@ pub(super) enum ImportMode {
     Walk,
     /// Around the mesh, looking at it.
     Orbit,
+}
+
+impl From<ImportMode> for import::Mode {
+    fn from(mode: ImportMode) -> Self {
+        match mode {
+            ImportMode::Fly => Self::Fly,
+            ImportMode::Walk => Self::Walk,
+            ImportMode::Orbit => Self::Orbit,
+        }
+    }
 }
 
 /// One frame of a walkthrough of something.

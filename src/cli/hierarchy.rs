@@ -19,7 +19,7 @@ pub(super) fn build(command: &Build) -> Result<()> {
     match command.backend {
         // The log is all that the in-memory tree needs.
         Backend::InMemory => {
-            stage(&format!("{}: writing", input.name()), |_| write_log(&command.output, &log))?
+            stage(&format!("{}: writing", input.name()), |_| write_log(&command.output, &log))?;
         }
     }
     if let Some(report) = report {

@@ -8,7 +8,7 @@ use super::arguments::{PathCommand, PathSubcommand};
 use super::input::Input;
 use super::print;
 use super::progress::stage;
-use crate::path::{self, Path};
+use crate::path::{self, Path, import};
 use crate::scene::{Scene, SceneKind};
 
 pub(super) fn path(command: &PathCommand) -> Result<()> {
@@ -24,8 +24,8 @@ pub(super) fn path(command: &PathCommand) -> Result<()> {
         PathSubcommand::Import { trajectory, fit, output, mode, rate } => {
             super::check_writable(output)?;
             let mesh = Input::one(fit)?.mesh()?;
-            let _ = (trajectory, mode, rate);
-            let path = path::around(&mesh);
+            let options = import::Options { mode: (*mode).into(), rate: *rate, ..import::Options::default() };
+            let path = import::import(trajectory, &mesh, &options)?;
             path.write(output)?;
             let mut text = String::new();
             describe(&mut text, &path);

@@ -1,12 +1,15 @@
 //! A walkthrough for anything: once around, from afar to near.
 
-use glam::{DMat3, DQuat, DVec3};
+use glam::DVec3;
 use vertex_tree::Mesh;
 
 use super::{Path, Pose};
+use crate::view::Camera;
 
 const FRAMES: usize = 720;
 const RATE: f64 = 60.0;
+const FOV_Y: f64 = std::f64::consts::FRAC_PI_3;
+const ASPECT: f64 = 16.0 / 9.0;
 
 /// Twelve seconds around a mesh, looking at its middle: from a distance of one and a half times its extent to where
 /// it fills the view and more, then on at that distance. A flat mesh is taken for terrain, seen from above with z up;
@@ -29,23 +32,11 @@ pub fn around(mesh: &Mesh) -> Path {
             let distance = extent * (1.5 - 1.05 * approach);
             let outwards = ahead * angle.cos() + side * angle.sin();
             let position = center + (outwards + up * height).normalize() * distance;
-            Pose { time: frame as f64 / RATE, position, orientation: looking(center - position, up) }
+            let camera = Camera::look_at(position, center, up, FOV_Y, ASPECT);
+            Pose { time: frame as f64 / RATE, position, orientation: camera.orientation }
         })
         .collect();
-    Path {
-        name: "around".to_owned(),
-        units: "units".to_owned(),
-        fov_y: 60_f64.to_radians(),
-        aspect: 16.0 / 9.0,
-        frames,
-    }
-}
-
-/// The rotation of a camera that looks along `direction`, upright.
-fn looking(direction: DVec3, up: DVec3) -> DQuat {
-    let back = -direction.normalize();
-    let right = up.cross(back).normalize();
-    DQuat::from_mat3(&DMat3::from_cols(right, back.cross(right), back)).normalize()
+    Path { name: "around".to_owned(), units: "units".to_owned(), fov_y: FOV_Y, aspect: ASPECT, frames }
 }
 
 #[cfg(test)]

@@ -92,14 +92,15 @@ fn city_paths(surface: &HeightField) -> [Director; 2] {
     let around = |x: f64, y: f64, above: f64| castle + DVec3::new(x, y, above);
     let ahead = |along: f64| Waypoint { position: high(along, 3.0), target: high(along + 55.0, 4.0) };
 
-    let mut calm = Director::new(ahead(-430.0), CALM_TURN);
-    let walk = (-20..=-8).map(|i| ahead(20.0 * f64::from(i)));
+    let mut calm = Director::new(ahead(-400.0), CALM_TURN);
+    let walk = (-19..=-8).map(|i| ahead(20.0 * f64::from(i)));
+    let old_town = castle + DVec3::new(-230.0, -330.0, -90.0);
     let climb = [
         Waypoint { position: high(-110.0, 12.0), target: castle },
         Waypoint { position: high(-50.0, 40.0), target: castle },
         Waypoint { position: around(60.0, -280.0, -50.0), target: castle },
-        Waypoint { position: around(190.0, -150.0, -25.0), target: castle },
-        Waypoint { position: around(220.0, -50.0, 10.0), target: castle + DVec3::new(-40.0, 20.0, 0.0) },
+        Waypoint { position: around(190.0, -150.0, -25.0), target: castle.midpoint(old_town) },
+        Waypoint { position: around(220.0, -50.0, 10.0), target: old_town },
     ];
     calm.travel(&walk.chain(climb).collect::<Vec<_>>(), 1.0);
 
@@ -190,7 +191,7 @@ fn laserscan_paths(surface: &HeightField) -> [Director; 2] {
         target: street(index, along + 50.0, 3.0),
     };
 
-    let start = roofs(250.0, -225.0, 30.0, park);
+    let start = roofs(245.0, -220.0, 30.0, park);
     let mut calm = Director::new(start, CALM_TURN);
     let mut route = vec![
         roofs(190.0, -170.0, 12.0, park + DVec3::new(-40.0, 60.0, 0.0)),
