@@ -27,21 +27,26 @@ pub(super) fn compare(command: &Compare) -> Result<()> {
     let paths: Vec<Path> = command.path.iter().map(|file| Path::read(file)).collect::<Result<_, _>>()?;
     let options = options(command);
     // Before the work, not after it.
-    std::fs::create_dir_all(&command.out).with_context(|| command.out.display().to_string())?;
-    super::check_writable(&command.out.join("report.html"))?;
+    super::check_folder(&command.out)?;
 
     let arguments: Vec<String> = std::env::args().skip(1).collect();
     let mut report = Report { command: format!("foldfront {}", arguments.join(" ")), sections: Vec::new() };
     for (input, name) in inputs.iter().zip(unique_names(&inputs)) {
-        let section = section(command, input, name, &paths, &options)?;
-        write(&command.out.join(format!("selection-{}.svg", section.name)), &section.curves()?)?;
-        report.sections.push(section);
+        report.sections.push(section(command, input, name, &paths, &options)?);
     }
+    let file = command.out.join("report.html");
+    let mut pages = vec![(file.clone(), report.to_html()?)];
+    for section in &report.sections {
+        pages.push((command.out.join(format!("selection-{}.svg", section.name)), section.curves()?));
+    }
+    // Only now, so that a failure leaves what is there as it is.
+    std::fs::create_dir_all(&command.out).with_context(|| command.out.display().to_string())?;
     let runs: Vec<&Run> = report.sections.iter().flat_map(|section| &section.runs).collect();
     csv::write_frames(&command.out.join("frames.csv"), &runs)?;
     csv::write_summary(&command.out.join("summary.csv"), &runs)?;
-    let file = command.out.join("report.html");
-    write(&file, &report.to_html()?)?;
+    for (file, text) in &pages {
+        write(file, text)?;
+    }
     print(&format!("{}\nThe report is in {}\n", report.to_text(), file.display()))
 }
 

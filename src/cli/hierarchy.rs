@@ -2,7 +2,7 @@
 
 use std::fmt::Write;
 
-use anyhow::Result;
+use anyhow::{Context, Result};
 use serde_json::json;
 use vertex_tree::{CollapseLog, read_log, write_log};
 
@@ -50,7 +50,7 @@ fn describe(report: &simplify::Report) -> String {
 
 pub(super) fn info(command: &Info) -> Result<()> {
     let log = read_log(&command.file)?;
-    let bytes = std::fs::metadata(&command.file)?.len();
+    let bytes = std::fs::metadata(&command.file).with_context(|| command.file.display().to_string())?.len();
     let forest = log.forest()?;
     let roots = forest.roots().count();
     let largest = log.collapses.iter().map(|c| c.bounds.eps).fold(0.0, f32::max);

@@ -73,7 +73,7 @@ impl Input {
     pub fn mesh(&self) -> Result<Mesh> {
         let name = self.name();
         match self {
-            Self::Scene(scene) => Ok(stage(&format!("{name}: making the scene"), |p| scene.mesh(p))),
+            Self::Scene(scene) => stage(&format!("{name}: making the scene"), |p| Ok(scene.mesh(p))),
             Self::Log(path) => Ok(vertex_tree::read_log(path)?.mesh),
             Self::Meshes(paths) => Ok(stage(&format!("{name}: reading"), |p| mesh_io::read(paths, p))?),
         }

@@ -42,7 +42,7 @@ fn generate(scenes: &[String], output: &std::path::Path) -> Result<()> {
     };
     std::fs::create_dir_all(output).with_context(|| output.display().to_string())?;
     for kind in kinds {
-        for path in stage(&format!("{}: walking", kind.name()), |p| path::generate(kind, p)) {
+        for path in stage(&format!("{}: walking", kind.name()), |p| anyhow::Ok(path::generate(kind, p)))? {
             path.write(&output.join(format!("{}.path", path.name)))?;
         }
     }
