@@ -205,6 +205,7 @@ impl Builder {
         let regular =
             joined && !surface.special[v as usize] && self.candidates.state[v as usize] != State::Forced;
         surface.special[u as usize] |= !regular;
+        surface.joined[u as usize] |= surface.joined[v as usize] || !joined;
         for spoke in &self.star {
             let triangle = &mut surface.triangles[spoke.triangle as usize];
             triangle.samples = NONE;
