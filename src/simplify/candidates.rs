@@ -112,7 +112,7 @@ impl Candidates {
         let (position, quadric) = (surface.position(v), &surface.quadrics[v as usize]);
         self.edges.clear();
         for &(u, triangles) in &self.neighbours {
-            if !special || triangles != 2 {
+            if !special || triangles != 2 || surface.joined[v as usize] {
                 self.edges.push((edge_key(quadric, surface.position(u) - position), u));
             }
         }

@@ -8,32 +8,31 @@
 //! p.(c x n) = s n.n      p.(n x b) = t n.n      (p.n)^2 / n.n = squared height
 //! ```
 //!
-//! so the foot lies inside where both products are positive and their sum is less than `n.n`. Everything is computed
-//! without branches for four triangles at a time, which compilers turn into vector instructions: the case
-//! distinction by regions (Ericson, "Real-time collision detection", 2005, 5.1.5) is cheaper in operations, but as
-//! good as random.
+//! so the foot lies inside where both products are positive and their sum is less than `n.n`. Everything is computed for
+//! four triangles at a time and without branches. To tell first in which region around the triangle the point lies
+//! (Ericson, "Real-time collision detection", 2005, 5.1.5) takes fewer operations, but no processor can guess the way.
 
-use glam::Vec3;
+use glam::{Vec3, Vec4};
 
-const LANES: usize = 4;
-type Lanes = [f32; LANES];
-
-/// Four triangles, one coordinate after the other. Lanes that are not in use hold triangles that are a single point,
-/// the common corner, and are never nearer than the others.
+/// Four triangles, a coordinate in each `Vec4`. Lanes that are not in use hold triangles that are a single point, the
+/// common corner, and are never nearer than the others.
 #[derive(Clone, Copy, Debug, Default)]
 struct Four {
-    b: [Lanes; 3],
-    c: [Lanes; 3],
-    n: [Lanes; 3],
-    c_cross_n: [Lanes; 3],
-    n_cross_b: [Lanes; 3],
-    nn: Lanes,
+    b: Lanes,
+    c: Lanes,
+    n: Lanes,
+    c_cross_n: Lanes,
+    n_cross_b: Lanes,
+    nn: Vec4,
     /// Reciprocals of the squared lengths of `n`, `b`, `c` and `c - b`; 0 for 0.
-    per_nn: Lanes,
-    per_bb: Lanes,
-    per_cc: Lanes,
-    per_ee: Lanes,
+    per_nn: Vec4,
+    per_bb: Vec4,
+    per_cc: Vec4,
+    per_ee: Vec4,
 }
+
+/// Four vectors: all x, all y, all z.
+type Lanes = [Vec4; 3];
 
 /// A sliver whose height is less than this part of its length is measured by its edges alone; squared.
 const SLIVER: f32 = 1e-10;
@@ -56,7 +55,7 @@ impl Fan {
 
     /// Adds the triangle of the corner, `b` and `c`.
     pub fn push(&mut self, b: Vec3, c: Vec3) {
-        let lane = self.count % LANES;
+        let lane = self.count % 4;
         if lane == 0 {
             self.fours.push(Four::default());
         }
@@ -75,11 +74,6 @@ impl Fan {
         self.fours.iter_mut().for_each(Four::prepare);
     }
 
-    /// Number of triangles.
-    pub fn len(&self) -> usize {
-        self.count
-    }
-
     /// The nearest triangle, the first one if several are, and its squared distance. For a fan without triangles, 0
     /// and infinity.
     pub fn nearest(&self, p: Vec3) -> (u32, f32) {
@@ -87,7 +81,7 @@ impl Fan {
         let mut nearest = (0, f32::INFINITY);
         let mut number = 0;
         for four in &self.fours {
-            for distance_squared in four.distances_squared(p) {
+            for distance_squared in four.distances_squared(p).to_array() {
                 if distance_squared < nearest.1 {
                     nearest = (number, distance_squared);
                 }
@@ -102,7 +96,7 @@ impl Fan {
         let p = p - self.corner;
         let mut nearest = f32::INFINITY;
         for four in &self.fours {
-            nearest = four.distances_squared(p).into_iter().fold(nearest, f32::min);
+            nearest = nearest.min(four.distances_squared(p).min_element());
             if nearest <= enough {
                 break;
             }
@@ -113,74 +107,63 @@ impl Fan {
 
 impl Four {
     fn prepare(&mut self) {
-        for i in 0..LANES {
-            let b = [self.b[0][i], self.b[1][i], self.b[2][i]];
-            let c = [self.c[0][i], self.c[1][i], self.c[2][i]];
-            let e = [c[0] - b[0], c[1] - b[1], c[2] - b[2]];
-            let (bb, cc, ee) = (dot(b, b), dot(c, c), dot(e, e));
-            let n = cross(b, c);
-            let nn = dot(n, n);
-            let flat = if nn > SLIVER * bb * cc { 1.0 } else { 0.0 };
-            let n = n.map(|x| x * flat);
-            let nn = nn * flat;
-            let (c_cross_n, n_cross_b) = (cross(c, n), cross(n, b));
-            for axis in 0..3 {
-                self.n[axis][i] = n[axis];
-                self.c_cross_n[axis][i] = c_cross_n[axis];
-                self.n_cross_b[axis][i] = n_cross_b[axis];
-            }
-            self.nn[i] = nn;
-            self.per_nn[i] = reciprocal(nn);
-            self.per_bb[i] = reciprocal(bb);
-            self.per_cc[i] = reciprocal(cc);
-            self.per_ee[i] = reciprocal(ee);
-        }
+        let (b, c) = (self.b, self.c);
+        let e = minus(c, b);
+        let (bb, cc) = (dot(b, b), dot(c, c));
+        let n = cross(b, c);
+        let nn = dot(n, n);
+        // Without a normal there is no inside.
+        let flat = Vec4::select(nn.cmpgt(SLIVER * bb * cc), Vec4::ONE, Vec4::ZERO);
+        self.n = n.map(|x| x * flat);
+        self.nn = nn * flat;
+        self.c_cross_n = cross(c, self.n);
+        self.n_cross_b = cross(self.n, b);
+        self.per_nn = reciprocal(self.nn);
+        self.per_bb = reciprocal(bb);
+        self.per_cc = reciprocal(cc);
+        self.per_ee = reciprocal(dot(e, e));
     }
 
-    fn distances_squared(&self, p: Vec3) -> Lanes {
-        let p = p.to_array();
-        let mut result = [0.0; LANES];
-        for i in 0..LANES {
-            let b = [self.b[0][i], self.b[1][i], self.b[2][i]];
-            let c = [self.c[0][i], self.c[1][i], self.c[2][i]];
-            let e = [c[0] - b[0], c[1] - b[1], c[2] - b[2]];
-            let q = [p[0] - b[0], p[1] - b[1], p[2] - b[2]];
-            let to_b = past_edge(p, b, self.per_bb[i]);
-            let to_c = past_edge(p, c, self.per_cc[i]);
-            let to_e = past_edge(q, e, self.per_ee[i]);
-            let edges = to_b.min(to_c).min(to_e);
-            let n = [self.n[0][i], self.n[1][i], self.n[2][i]];
-            let height = dot(p, n);
-            let s = dot(p, [self.c_cross_n[0][i], self.c_cross_n[1][i], self.c_cross_n[2][i]]);
-            let t = dot(p, [self.n_cross_b[0][i], self.n_cross_b[1][i], self.n_cross_b[2][i]]);
-            let inside = (s > 0.0) & (t > 0.0) & (s + t < self.nn[i]);
-            result[i] = if inside { height * height * self.per_nn[i] } else { edges };
-        }
-        result
+    fn distances_squared(&self, p: Vec3) -> Vec4 {
+        let p = p.to_array().map(Vec4::splat);
+        let (b, c) = (self.b, self.c);
+        let edges = past_edge(p, b, self.per_bb)
+            .min(past_edge(p, c, self.per_cc))
+            .min(past_edge(minus(p, b), minus(c, b), self.per_ee));
+        let (s, t) = (dot(p, self.c_cross_n), dot(p, self.n_cross_b));
+        let inside = s.cmpgt(Vec4::ZERO) & t.cmpgt(Vec4::ZERO) & (s + t).cmplt(self.nn);
+        let height = dot(p, self.n);
+        Vec4::select(inside, height * height * self.per_nn, edges)
     }
 }
 
 /// Squared distance from `p` to the segment from the origin to `e`.
-fn past_edge(p: [f32; 3], e: [f32; 3], per_ee: f32) -> f32 {
-    let t = (dot(p, e) * per_ee).max(0.0).min(1.0);
-    let d = [p[0] - t * e[0], p[1] - t * e[1], p[2] - t * e[2]];
+fn past_edge(p: Lanes, e: Lanes, per_ee: Vec4) -> Vec4 {
+    let t = (dot(p, e) * per_ee).max(Vec4::ZERO).min(Vec4::ONE);
+    let d = minus(p, e.map(|x| x * t));
     dot(d, d)
+}
+
+fn minus(a: Lanes, b: Lanes) -> Lanes {
+    [a[0] - b[0], a[1] - b[1], a[2] - b[2]]
+}
+
+fn dot(a: Lanes, b: Lanes) -> Vec4 {
+    a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
+}
+
+fn cross(a: Lanes, b: Lanes) -> Lanes {
+    [a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]]
+}
+
+fn reciprocal(x: Vec4) -> Vec4 {
+    Vec4::select(x.cmpgt(Vec4::ZERO), x.recip(), Vec4::ZERO)
 }
 
 /// Squared distance from `p` to the segment from `a` to `b`.
 pub(super) fn segment_distance_squared(p: Vec3, a: Vec3, b: Vec3) -> f32 {
-    let e = b - a;
-    past_edge((p - a).to_array(), e.to_array(), reciprocal(e.length_squared()))
-}
-
-fn dot(a: [f32; 3], b: [f32; 3]) -> f32 {
-    a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
-}
-
-fn cross(a: [f32; 3], b: [f32; 3]) -> [f32; 3] {
-    [a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]]
-}
-
-fn reciprocal(x: f32) -> f32 {
-    if x > 0.0 { 1.0 / x } else { 0.0 }
+    let (e, p) = (b - a, p - a);
+    let ee = e.length_squared();
+    let t = if ee > 0.0 { (p.dot(e) / ee).clamp(0.0, 1.0) } else { 0.0 };
+    p.distance_squared(e * t)
 }

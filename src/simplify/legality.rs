@@ -11,11 +11,14 @@ const COSINE_SQUARED: f32 = 0.0625;
 /// speak of; squared.
 const FLAT_SQUARED: f32 = 1e-10;
 
-/// Whether `v` can merge into `u`. `star` is the star of `v`. Along a virtual edge nothing vanishes, and joining what is
-/// apart is its purpose; otherwise the topology must stay what it is.
+/// Whether `v` can merge into `u`. `star` is the star of `v`. Along a virtual edge, and where components have been
+/// joined, the topology is no longer that of the input, and need not be kept.
 pub(super) fn is_legal(v: u32, u: u32, star: &[Spoke], surface: &Surface, marks: &mut Marks) -> bool {
-    let joined = star.iter().any(|spoke| spoke.touches(u));
-    keeps_orientation(v, u, star, surface) && (!joined || keeps_topology(v, u, star, surface, marks))
+    keeps_orientation(v, u, star, surface)
+        && (surface.joined[v as usize]
+            || surface.joined[u as usize]
+            || !star.iter().any(|spoke| spoke.touches(u))
+            || keeps_topology(v, u, star, surface, marks))
 }
 
 /// Whether `v` can merge into `u` without a change of topology. `star` is the star of `v`.

@@ -63,6 +63,7 @@ impl Builder {
         let mut order = Vec::new();
         // How many vertices there were when virtual edges were last sought, and how far beyond their usual distance.
         let (mut sought_among, mut reach) = (usize::MAX, 1.0);
+        let mut hopeless_retried = false;
         loop {
             progress((all - self.surface.live.len()) as u64, all as u64);
             if self.merge && self.surface.live.len() <= sought_among / 2 {
@@ -70,24 +71,24 @@ impl Builder {
                 self.seek_virtual_edges(reach);
             }
             self.refresh_candidates();
-            let mut limit = self.key_limit();
-            if limit.is_none() {
-                self.retry_hopeless();
-                limit = self.key_limit();
-            }
-            let Some(limit) = limit else {
-                if self.merge && self.surface.live.len() > 1 && reach < FARTHEST_REACH {
-                    reach *= 2.0;
-                    self.seek_virtual_edges(reach);
-                    continue;
+            if let Some(limit) = self.key_limit() {
+                if self.run_round(limit, &mut order) {
+                    hopeless_retried = false;
                 }
+            } else if !hopeless_retried {
+                hopeless_retried = true;
+                self.retry_hopeless();
+            } else if self.merge && reach < FARTHEST_REACH {
+                reach *= 2.0;
+                self.seek_virtual_edges(reach);
+            } else {
                 return;
-            };
-            self.run_round(limit, &mut order);
+            }
         }
     }
 
-    fn run_round(&mut self, limit: f32, order: &mut Vec<u64>) {
+    /// Says whether anything has been collapsed.
+    fn run_round(&mut self, limit: f32, order: &mut Vec<u64>) -> bool {
         let first = self.nodes.next();
         for start in (0..self.surface.live.len()).step_by(BLOCK) {
             let end = self.surface.live.len().min(start + BLOCK);
@@ -104,10 +105,12 @@ impl Builder {
                 self.attempt(entry as u32, first);
             }
         }
-        if self.nodes.next() > first {
-            self.rounds.push(first);
-            self.surface.rebuild_stars();
+        if self.nodes.next() == first {
+            return false;
         }
+        self.rounds.push(first);
+        self.surface.rebuild_stars();
+        true
     }
 
     /// The key up to which candidates are taken up: the median.
@@ -202,6 +205,7 @@ impl Builder {
         let regular =
             joined && !surface.special[v as usize] && self.candidates.state[v as usize] != State::Forced;
         surface.special[u as usize] |= !regular;
+        surface.joined[u as usize] |= surface.joined[v as usize] || !joined;
         for spoke in &self.star {
             let triangle = &mut surface.triangles[spoke.triangle as usize];
             triangle.samples = NONE;
@@ -264,7 +268,12 @@ impl Builder {
         }
         for s in self.star.iter().filter(|s| !s.touches(u)) {
             // The triangle's other edge from `u` is the next one's, or was there before.
-            samples.measure_reverse((to + surface.position(s.next)) * 0.5);
+            let (next, last) = corners(s);
+            samples.measure_reverse((to + next) * 0.5);
+            if self.merge {
+                // Joined walls can close a yard whose rim they do not leave.
+                samples.measure_reverse((to + next + last) / 3.0);
+            }
         }
         samples.error()
     }

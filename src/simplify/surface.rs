@@ -43,6 +43,8 @@ pub(super) struct Surface {
     /// Whether the vertex touches an edge that does not join exactly two triangles. Of vertices near a recent change
     /// it may say so falsely.
     pub special: Vec<bool>,
+    /// Whether a virtual edge has been collapsed at the vertex, or at one that merged into it.
+    pub joined: Vec<bool>,
     /// The vertex that has taken the place of a removed one, or `NONE`.
     pub merged_into: Vec<u32>,
     pub triangles: Vec<Triangle>,
@@ -69,6 +71,7 @@ impl Surface {
             positions,
             quadrics: vec![Quadric::default(); count],
             special: vec![false; count],
+            joined: vec![false; count],
             merged_into: vec![NONE; count],
             triangles: triangles.iter().map(triangle).collect(),
             live: (0..count as u32).filter(|&v| has_triangle[v as usize]).collect(),
