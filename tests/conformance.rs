@@ -5,6 +5,7 @@ mod common;
 
 use std::f64::consts::PI;
 use std::sync::OnceLock;
+use std::time::Duration;
 
 use common::backends::{Conformance, Totals};
 use common::{Random, data, random_step, random_view, turn};
@@ -178,6 +179,21 @@ fn a_budget_tightened_and_loosened() {
         }
     }
     assert!(table.totals.changes > 50_000, "{:?}", table.totals);
+}
+
+/// What a frame takes is different every time, and with it the tolerance; the cut is exact all the same.
+#[test]
+fn a_budget_in_time() {
+    let Some(log) = bunny() else { return };
+    let path = around(&log.mesh);
+    let mut table = Conformance::new(log, settings_for(&path));
+    for microseconds in [5, 50, 1] {
+        table.set_budget(Budget::FrameTime(Duration::from_micros(microseconds)));
+        for frame in 0..300 {
+            table.advance_each(&[View::new(&path.camera(frame), pixels(1.0))]);
+        }
+    }
+    assert!(table.totals.changes > 20_000, "{:?}", table.totals);
 }
 
 /// Two eyes and a shadow's view, which come and go.

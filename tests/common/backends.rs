@@ -110,6 +110,20 @@ impl<'a> Conformance<'a> {
         self.followers.iter_mut().for_each(|(_, follower)| follower.set_budget(budget));
     }
 
+    /// Moves all of them to these views. The cut of each must be that of the oracle for what its own budget made of
+    /// them: a budget in time steers each its own way.
+    #[track_caller]
+    pub fn advance_each(&mut self, views: &[View]) {
+        for (backend, follower) in &mut self.followers {
+            let report = follower.advance(views);
+            let difference = follower.difference(&mut self.oracle);
+            let frame = self.totals.frames;
+            assert_eq!(difference, "None", "{backend}, {}, frame {frame}", follower.strategy().name());
+            self.totals.changes += report.unfolds + report.folds;
+        }
+        self.totals.frames += 1;
+    }
+
     /// Moves all of them to these views. The cut of each must be that of the oracle, which is asked once for all.
     #[track_caller]
     pub fn advance(&mut self, views: &[View]) {

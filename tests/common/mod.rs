@@ -3,6 +3,7 @@
 
 pub mod backends;
 pub mod data;
+pub mod sink;
 
 use foldfront::view::View;
 use foldfront::{Bounds, Collapse, CollapseLog, Mesh};
