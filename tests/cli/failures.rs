@@ -110,6 +110,26 @@ fn a_bad_path_is_named_with_the_line_in_it() {
 }
 
 #[test]
+fn a_bad_trajectory_is_named_with_the_line_in_it() {
+    let place = with_earlier_outputs();
+    place.write("one.txt", "0 1 2 3 0 0 0 1\n");
+    place.write("narrow.txt", "0 1\n1 2\n");
+    place.write("ragged.txt", "0 1 2 3 0 0 0 1\n1 1 2 4 0 0 0 1\n2 1 2\n");
+    place.write("word.txt", "0 1 2 3 0 0 0 1\n1 one 2 4 0 0 0 1\n");
+    for (trajectory, said) in [
+        ("missing.txt", "missing.txt: No such file"),
+        ("one.txt", "one.txt: 1 frames"),
+        ("narrow.txt", "narrow.txt:1: "),
+        ("ragged.txt", "ragged.txt:3: 8 columns"),
+        ("word.txt", "word.txt:2: \"one\""),
+    ] {
+        place.fail(&format!("path import {trajectory} --fit grid.ply -o out.path"), 1, &[said]);
+    }
+    place.fail("path import descent.path --fit grid.ply -o out.path --rate 0", 2, &["'0'", "--rate"]);
+    place.fail("path import descent.path --fit grid.ply -o out.path --rate 1e9", 1, &["1000000000 frames"]);
+}
+
+#[test]
 fn a_frame_that_is_not_there_is_named() {
     let place = with_earlier_outputs();
     let said: &[&str] = &["path descent has frames 0 to 2, not 3"];
@@ -253,7 +273,7 @@ fn what_does_not_fit_on_the_disk_leaves_nothing_behind() {
     let place = with_earlier_outputs();
     place.succeed("build grid.ply -o grid.log");
     for (reader, file) in READERS.iter().zip(["out.log", "", "out.ply", "out.png", "", "out.path"]) {
-        let command = reader.replace("INPUT", "grid.log");
+        let command = reader.replace("INPUT", "grid.log").replace("out.path", "out.path --rate 1000");
         let mut limited = std::process::Command::new("sh");
         limited
             .args(["-c", &format!("trap '' XFSZ; ulimit -f 1; exec \"$0\" {command}")])

@@ -208,7 +208,7 @@ fn counts_are_checked_before_anything_is_read() {
         let [v, t, c] = counts;
         match place.read(&with_counts(counts)) {
             Err(LogFileError::Length { expected, .. }) => {
-                assert_eq!(expected, 44 + 12 * v + 12 * t + 28 * c + 12)
+                assert_eq!(expected, 44 + 12 * v + 12 * t + 28 * c + 12);
             }
             other => panic!("{counts:?}: {other:?}"),
         }
