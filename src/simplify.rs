@@ -2,23 +2,25 @@
 
 mod ball;
 mod candidates;
-mod closest;
+mod fan;
 mod legality;
+mod marks;
 mod nodes;
 mod quadric;
 mod rounds;
 mod samples;
 mod spatial_order;
 mod surface;
+mod virtual_edges;
 
 use std::time::{Duration, Instant};
 
 use glam::{DVec3, Vec3};
-use vertex_tree::{Collapse, CollapseLog, LogError, Mesh};
+use vertex_tree::{Bounds, Collapse, CollapseLog, LogError, Mesh};
 
 use crate::progress::Progress;
+use marks::Marks;
 use nodes::{Nodes, round_up};
-use quadric::Quadric;
 use rounds::Builder;
 use surface::Surface;
 
@@ -40,7 +42,7 @@ pub struct Report {
     /// Collapses made.
     pub collapses: usize,
     /// Rounds of independent collapses.
-    pub rounds: u32,
+    pub rounds: usize,
     /// Roots of the forest.
     pub roots: usize,
     /// Depth of the forest.
@@ -52,7 +54,7 @@ pub struct Report {
     /// The largest error of a node, in object units.
     pub largest_eps: f32,
     /// Collapses whose key was less than that of an earlier one.
-    pub inversions: u32,
+    pub inversions: usize,
     /// Time to prepare: renumbering, quadrics.
     pub preparation: Duration,
     /// Time of the rounds.
@@ -65,7 +67,7 @@ pub struct Report {
 ///
 /// # Errors
 /// If a triangle names a vertex that is not there or a coordinate is not finite.
-pub fn build(mesh: Mesh, _options: &Options, progress: Progress) -> Result<(CollapseLog, Report), LogError> {
+pub fn build(mesh: Mesh, options: &Options, progress: Progress) -> Result<(CollapseLog, Report), LogError> {
     let start = Instant::now();
     let mut log = CollapseLog { mesh, collapses: Vec::new() };
     log.forest()?;
@@ -85,27 +87,12 @@ pub fn build(mesh: Mesh, _options: &Options, progress: Progress) -> Result<(Coll
         number[old as usize] = new;
     }
     let positions: Vec<Vec3> = order.iter().map(|&old| scaled[old as usize]).collect();
-    let mut leaf_radius = vec![0.0_f32; positions.len()];
-    let mut corners: Vec<[u32; 3]> = Vec::with_capacity(mesh.triangles.len());
-    for triangle in &mesh.triangles {
-        let [a, b, c] = triangle.map(|v| number[v as usize]);
-        for (v, w) in [(a, b), (b, c), (c, a)] {
-            let length =
-                positions[v as usize].as_dvec3().distance(positions[w as usize].as_dvec3()) * (1.0 + 1e-15);
-            let length = round_up(length);
-            leaf_radius[v as usize] = leaf_radius[v as usize].max(length);
-            leaf_radius[w as usize] = leaf_radius[w as usize].max(length);
-        }
-        if a != b && b != c && c != a {
-            corners.push([a, b, c]);
-        }
-    }
-    corners.sort_by_key(|&[a, b, c]| a.min(b).min(c));
-    let surface = Surface::new(positions, corners.iter().copied());
-    drop(corners);
-    let quadrics = initial_quadrics(&surface);
+    let leaf_radius = leaf_radii(&mesh.triangles, &number, &positions);
+    let mut surface = Surface::new(positions, &coherent_triangles(&mesh.triangles, &number));
+    let mut marks = Marks::new(order.len());
+    set_initial_quadrics(&mut surface, &mut marks);
     let nodes = Nodes::new(leaf_radius, extent / scale);
-    let mut builder = Builder::new(surface, quadrics, nodes);
+    let mut builder = Builder::new(surface, nodes, marks, options.merge_components);
     let preparation = start.elapsed();
 
     let start = Instant::now();
@@ -113,32 +100,33 @@ pub fn build(mesh: Mesh, _options: &Options, progress: Progress) -> Result<(Coll
     let simplification = start.elapsed();
 
     let start = Instant::now();
-    let back = |v: u32| order[v as usize];
-    let unscale = |x: f32| (f64::from(x) * scale) as f32;
-    let clamped = |x: f32| unscale(x).min(f32::MAX);
-    log.collapses = builder
-        .nodes
-        .collapses
-        .iter()
-        .map(|c| {
-            let mut bounds = c.bounds;
-            bounds.center = bounds.center.map(unscale);
-            bounds.radius = clamped(bounds.radius);
-            bounds.eps = clamped(bounds.eps);
-            Collapse { removed: back(c.removed), kept: back(c.kept), bounds }
-        })
-        .collect();
+    let nodes = &builder.nodes;
+    let (sequence, inversions) = sequence(&nodes.keys, &builder.rounds);
+    let unscaled = |x: f32| ((f64::from(x) * scale) as f32).min(f32::MAX);
+    let collapses = sequence.iter().map(|&node| {
+        let c = nodes.collapses[node as usize];
+        Collapse {
+            removed: order[c.removed as usize],
+            kept: order[c.kept as usize],
+            bounds: Bounds {
+                center: c.bounds.center.map(unscaled),
+                radius: unscaled(c.bounds.radius),
+                eps: unscaled(c.bounds.eps),
+            },
+        }
+    });
+    log.collapses = collapses.collect();
     let forest = log.forest()?;
     let report = Report {
         triangles: log.mesh.triangles.len(),
         collapses: log.collapses.len(),
-        rounds: builder.rounds,
+        rounds: builder.rounds.len(),
         roots: forest.roots().count(),
         tree_depth: forest.depth(),
-        dependency_depth: builder.nodes.depth.iter().copied().max().unwrap_or(0),
-        base_triangles: builder.surface.triangles.len(),
-        largest_eps: log.collapses.iter().fold(0.0, |m, c| m.max(c.bounds.eps)),
-        inversions: builder.inversions,
+        dependency_depth: nodes.depth.iter().copied().max().unwrap_or(0),
+        base_triangles: builder.surface.live_triangles,
+        largest_eps: log.collapses.iter().fold(0.0, |largest, c| c.bounds.eps.max(largest)),
+        inversions,
         preparation,
         simplification,
         conclusion: start.elapsed(),
@@ -146,35 +134,97 @@ pub fn build(mesh: Mesh, _options: &Options, progress: Progress) -> Result<(Coll
     Ok((log, report))
 }
 
+/// The nodes of each round in ascending order of keys, and the number of those whose key is less than an earlier one's.
+fn sequence(keys: &[f32], rounds: &[u32]) -> (Vec<u32>, usize) {
+    let mut sequence: Vec<u32> = (0..keys.len() as u32).collect();
+    let ends = rounds.iter().skip(1).copied().chain([keys.len() as u32]);
+    for (&start, end) in rounds.iter().zip(ends) {
+        sequence[start as usize..end as usize]
+            .sort_unstable_by(|&a, &b| keys[a as usize].total_cmp(&keys[b as usize]).then(a.cmp(&b)));
+    }
+    let (mut highest, mut inversions) = (0.0, 0);
+    for &node in &sequence {
+        let key = keys[node as usize];
+        if key < highest {
+            inversions += 1;
+        }
+        highest = key.max(highest);
+    }
+    (sequence, inversions)
+}
+
 /// Weight of a plane that holds a boundary edge in place, per squared length of the edge.
 const BOUNDARY_WEIGHT: f32 = 4.0;
 
-/// The planes of the triangles around each vertex, weighted by area, and at edges that do not join exactly two
-/// triangles a plane through the edge, upright on the triangle.
-fn initial_quadrics(surface: &Surface) -> Vec<Quadric> {
-    let mut quadrics = vec![Quadric::default(); surface.positions.len()];
-    for t in &surface.triangles {
-        let [a, b, c] = t.corners;
+/// For each vertex in the new numbering, its distance to the farthest corner of its triangles.
+fn leaf_radii(triangles: &[[u32; 3]], number: &[u32], positions: &[Vec3]) -> Vec<f32> {
+    let mut farthest = vec![0.0_f64; positions.len()];
+    for triangle in triangles {
+        let [a, b, c] = triangle.map(|v| number[v as usize] as usize);
+        for (v, w) in [(a, b), (b, c), (c, a)] {
+            let squared = positions[v].as_dvec3().distance_squared(positions[w].as_dvec3());
+            farthest[v] = farthest[v].max(squared);
+            farthest[w] = farthest[w].max(squared);
+        }
+    }
+    farthest.into_iter().map(|squared| round_up(squared.sqrt() * (1.0 + 1e-15))).collect()
+}
+
+/// The triangles with three different corners in the new numbering, in the order of their lowest vertices.
+fn coherent_triangles(triangles: &[[u32; 3]], number: &[u32]) -> Vec<[u32; 3]> {
+    let renumbered = || {
+        triangles
+            .iter()
+            .map(|t| t.map(|v| number[v as usize]))
+            .filter(|&[a, b, c]| a != b && b != c && c != a)
+    };
+    let lowest = |[a, b, c]: [u32; 3]| a.min(b).min(c) as usize;
+    let mut place = vec![0_usize; number.len() + 1];
+    for t in renumbered() {
+        place[lowest(t) + 1] += 1;
+    }
+    for v in 1..place.len() {
+        place[v] += place[v - 1];
+    }
+    let mut ordered = vec![[0; 3]; place.last().copied().unwrap_or(0)];
+    for t in renumbered() {
+        let slot = &mut place[lowest(t)];
+        ordered[*slot] = t;
+        *slot += 1;
+    }
+    ordered
+}
+
+/// Gives each vertex the planes of the triangles around it, weighted by area, and at edges that do not join exactly
+/// two triangles a plane through the edge, upright on the triangle. Also finds which vertices have such edges.
+fn set_initial_quadrics(surface: &mut Surface, marks: &mut Marks) {
+    for i in 0..surface.triangles.len() {
+        let corners @ [a, b, c] = surface.triangles[i].corners;
         let normal = surface.normal(a, b, c);
         let length = normal.length();
-        if length <= 0.0 {
-            continue;
-        }
-        let unit = normal / length;
-        for v in t.corners {
-            quadrics[v as usize].add_plane(unit, 0.5 * length, 0.5 * length);
-        }
-        for (v, w) in [(a, b), (b, c), (c, a)] {
-            // Of a pair of triangles at an edge, one lists its vertices in ascending order as a rule.
-            let count = surface.spokes(v).filter(|s| s.next == w || s.last == w).count();
-            if count != 2 {
-                let edge = surface.position(w) - surface.position(v);
-                let upright = edge.cross(unit).normalize_or_zero();
-                let weight = BOUNDARY_WEIGHT * edge.length_squared();
-                quadrics[v as usize].add_plane(upright, weight, 0.0);
-                quadrics[w as usize].add_plane(upright, weight, 0.0);
+        if length > 0.0 {
+            for v in corners {
+                surface.quadrics[v as usize].add_plane(normal / length, 0.5 * length, 0.5 * length);
             }
         }
     }
-    quadrics
+    let mut neighbours = Vec::new();
+    for i in 0..surface.live.len() {
+        let v = surface.live[i];
+        if surface.is_surrounded(v) {
+            continue;
+        }
+        surface.neighbours(v, marks, &mut neighbours);
+        let mut quadric = surface.quadrics[v as usize];
+        for &(w, _) in neighbours.iter().filter(|&&(_, triangles)| triangles != 2) {
+            surface.special[v as usize] = true;
+            let edge = surface.position(w) - surface.position(v);
+            let weight = BOUNDARY_WEIGHT * edge.length_squared();
+            for s in surface.spokes(v).filter(|s| s.touches(w)) {
+                let upright = edge.cross(surface.normal(v, s.next, s.last)).normalize_or_zero();
+                quadric.add_plane(upright, weight, 0.0);
+            }
+        }
+        surface.quadrics[v as usize] = quadric;
+    }
 }

@@ -4,27 +4,33 @@
 //! for, plus a little of the squared length of the edge. The second term decides where the first is zero, on plane
 //! ground and among doubled vertices: short edges first keeps triangles well-shaped and trees shallow.
 //!
-//! Cheap keys are kept from round to round, and found anew only where a star has changed. Whether a collapse is legal
-//! costs more and is asked when its turn comes: most candidates are overtaken by a change nearby before that.
+//! Keys are kept from round to round. Whether a collapse is legal costs more to say, and is asked when its turn comes:
+//! most candidates are overtaken by a change nearby before that.
 
+use glam::Vec3;
 use vertex_tree::NONE;
 
+use super::marks::Marks;
 use super::quadric::Quadric;
-use super::surface::{Marks, Surface};
+use super::surface::Surface;
 
-/// Part of the squared length of the edge that is added to the squared distance.
+/// Part of the squared length of an edge that is added to the squared distance.
 const LENGTH_TERM: f32 = 1e-4;
 
 /// What is known of a vertex's candidate.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum State {
-    /// The star has changed: to be found anew.
+    /// The star has changed in this round: to be found anew.
     Outdated,
+    /// The star has changed in this round, but the cheapest edge is known.
+    Updated,
     /// The cheapest edge, legal or not.
     Cheapest,
     /// The cheapest edge that was legal when last asked.
     Legal,
-    /// No legal edge when last asked.
+    /// No edge is legal, so the shortest is taken all the same.
+    Forced,
+    /// No edge is legal.
     Nothing,
 }
 
@@ -34,11 +40,9 @@ pub(super) struct Candidates {
     pub key: Vec<f32>,
     pub target: Vec<u32>,
     pub state: Vec<State>,
-    /// Whether the vertex touches an edge that does not join exactly two triangles.
-    pub special: Vec<bool>,
     /// The neighbours of one vertex, and the number of triangles at the edge to each.
     neighbours: Vec<(u32, u32)>,
-    /// Edges of one vertex and their keys.
+    /// Edges of one vertex with their keys.
     edges: Vec<(f32, u32)>,
 }
 
@@ -48,75 +52,106 @@ impl Candidates {
             key: vec![0.0; count],
             target: vec![NONE; count],
             state: vec![State::Outdated; count],
-            special: vec![false; count],
             neighbours: Vec::new(),
             edges: Vec::new(),
         }
     }
 
-    /// Finds the edges along which `v` may be removed as far as `v`'s own star can say, with their keys.
-    fn find_edges(&mut self, v: u32, surface: &Surface, quadrics: &[Quadric], marks: &mut Marks) {
-        self.neighbours.clear();
-        marks.clear();
-        for spoke in surface.spokes(v) {
-            for w in [spoke.next, spoke.last] {
-                match marks.get(w) {
-                    Some(i) => self.neighbours[i as usize].1 += 1,
-                    None => {
-                        marks.set(w, self.neighbours.len() as u32);
-                        self.neighbours.push((w, 1));
-                    }
-                }
-            }
+    /// Finds the cheapest edge of `v` for the next round.
+    pub fn refresh(&mut self, v: u32, surface: &mut Surface, marks: &mut Marks) {
+        if surface.special[v as usize] {
+            self.find_edges(v, surface, marks);
+            let cheapest = self.edges.iter().copied().reduce(cheaper);
+            self.set(v, cheapest, State::Cheapest);
+            return;
         }
-        // A vertex on a boundary, or on a seam where more than two triangles meet, stays on it.
-        let special = self.neighbours.iter().any(|&(_, triangles)| triangles != 2);
-        self.special[v as usize] = special;
-        let position = surface.position(v);
-        self.edges.clear();
-        for &(u, triangles) in &self.neighbours {
-            if !special || triangles != 2 {
-                let d = surface.position(u) - position;
-                let key = quadrics[v as usize].error(d) + LENGTH_TERM * d.length_squared();
-                self.edges.push((key, u));
-            }
-        }
-    }
-
-    /// Finds the cheapest edge of `v`.
-    pub fn refresh(&mut self, v: u32, surface: &Surface, quadrics: &[Quadric], marks: &mut Marks) {
-        self.find_edges(v, surface, quadrics, marks);
-        let cheapest = self.edges.iter().copied().min_by(order);
+        // Triangles close up around `v`, so every neighbour comes next in one of them. Where orientations disagree
+        // one may be missed here.
+        let (position, quadric) = (surface.position(v), &surface.quadrics[v as usize]);
+        let neighbours = surface
+            .spokes(v)
+            .map(|spoke| (edge_key(quadric, surface.position(spoke.next) - position), spoke.next));
+        let partners = surface
+            .virtual_edges
+            .partners(v)
+            .map(|w| (virtual_key(quadric, surface.position(w) - position), w));
+        let cheapest = neighbours.chain(partners).reduce(cheaper);
         self.set(v, cheapest, State::Cheapest);
     }
 
-    /// Finds the cheapest edge of `v` that is legal.
+    /// Finds the cheapest edge of `v` that is legal. If none is and `force` is set, takes the shortest.
     pub fn refresh_legal(
         &mut self,
         v: u32,
-        surface: &Surface,
-        quadrics: &[Quadric],
+        surface: &mut Surface,
         marks: &mut Marks,
-        mut is_legal: impl FnMut(u32, &mut Marks) -> bool,
+        force: bool,
+        mut is_legal: impl FnMut(u32, &Surface, &mut Marks) -> bool,
     ) {
-        self.find_edges(v, surface, quadrics, marks);
-        self.edges.sort_unstable_by(order);
-        let legal = self.edges.iter().copied().find(|&(_, u)| is_legal(u, marks));
-        self.set(v, legal, State::Legal);
+        self.find_edges(v, surface, marks);
+        self.edges.sort_unstable_by(|a, b| a.0.total_cmp(&b.0).then(a.1.cmp(&b.1)));
+        let legal = self.edges.iter().copied().find(|&(_, u)| is_legal(u, surface, marks));
+        if legal.is_some() || !force {
+            self.set(v, legal, State::Legal);
+            return;
+        }
+        let neighbours = self.neighbours.iter().map(|&(u, _)| u);
+        let shortest = neighbours
+            .chain(surface.virtual_edges.partners(v))
+            .map(|u| (surface.position(v).distance_squared(surface.position(u)), u))
+            .reduce(cheaper);
+        self.set(v, shortest, State::Forced);
+    }
+
+    /// Finds all edges along which `v` may be removed as far as its own star can say.
+    fn find_edges(&mut self, v: u32, surface: &mut Surface, marks: &mut Marks) {
+        surface.neighbours(v, marks, &mut self.neighbours);
+        // A vertex on a boundary, or on a seam where more than two triangles meet, stays on it.
+        let special = self.neighbours.iter().any(|&(_, triangles)| triangles != 2);
+        surface.special[v as usize] = special;
+        let (position, quadric) = (surface.position(v), &surface.quadrics[v as usize]);
+        self.edges.clear();
+        for &(u, triangles) in &self.neighbours {
+            if !special || triangles != 2 || surface.joined[v as usize] {
+                self.edges.push((edge_key(quadric, surface.position(u) - position), u));
+            }
+        }
+        for w in surface.virtual_edges.partners(v) {
+            self.edges.push((virtual_key(quadric, surface.position(w) - position), w));
+        }
+    }
+
+    /// Brings the candidate of `w` up to date after its neighbour `lost` has merged into `gained`.
+    pub fn neighbour_merged(&mut self, w: u32, lost: u32, gained: u32, surface: &Surface) {
+        let i = w as usize;
+        let known = matches!(self.state[i], State::Cheapest | State::Updated);
+        if !known || surface.special[i] || self.target[i] == lost {
+            self.state[i] = State::Outdated;
+            return;
+        }
+        // The other edges of `w` are what they were.
+        let key = edge_key(&surface.quadrics[i], surface.position(gained) - surface.position(w));
+        (self.key[i], self.target[i]) = cheaper((self.key[i], self.target[i]), (key, gained));
+        self.state[i] = State::Updated;
     }
 
     fn set(&mut self, v: u32, candidate: Option<(f32, u32)>, state: State) {
-        let (key, target, state) = match candidate {
-            Some((key, target)) => (key, target, state),
-            None => (f32::INFINITY, NONE, State::Nothing),
-        };
-        self.key[v as usize] = key;
-        self.target[v as usize] = target;
-        self.state[v as usize] = state;
+        let i = v as usize;
+        (self.key[i], self.target[i]) = candidate.unwrap_or((f32::INFINITY, NONE));
+        self.state[i] = if candidate.is_some() { state } else { State::Nothing };
     }
 }
 
-/// Ascending keys, ties by vertex number.
-fn order(a: &(f32, u32), b: &(f32, u32)) -> std::cmp::Ordering {
-    a.0.total_cmp(&b.0).then(a.1.cmp(&b.1))
+fn edge_key(quadric: &Quadric, d: Vec3) -> f32 {
+    quadric.error(d) + LENGTH_TERM * d.length_squared()
+}
+
+/// Joining what is apart shows surface where there was none: the distance itself is an error.
+fn virtual_key(quadric: &Quadric, d: Vec3) -> f32 {
+    quadric.error(d) + d.length_squared()
+}
+
+/// The edge with the lower key, or with the lower vertex number if keys are equal.
+fn cheaper(a: (f32, u32), b: (f32, u32)) -> (f32, u32) {
+    if b.0 < a.0 || (b.0 == a.0 && b.1 < a.1) { b } else { a }
 }

@@ -1,6 +1,9 @@
 //! Whether a collapse keeps the topology, and turns no triangle over.
 
-use super::surface::{Marks, Spoke, Surface};
+use glam::Vec3;
+
+use super::marks::Marks;
+use super::surface::{Spoke, Surface};
 
 /// A triangle may turn by less than this: the square of the cosine of about 75 degrees.
 const COSINE_SQUARED: f32 = 0.0625;
@@ -8,13 +11,23 @@ const COSINE_SQUARED: f32 = 0.0625;
 /// speak of; squared.
 const FLAT_SQUARED: f32 = 1e-10;
 
+/// Whether `v` can merge into `u`. `star` is the star of `v`. Along a virtual edge, and where components have been
+/// joined, the topology is no longer that of the input, and need not be kept.
+pub(super) fn is_legal(v: u32, u: u32, star: &[Spoke], surface: &Surface, marks: &mut Marks) -> bool {
+    keeps_orientation(v, u, star, surface)
+        && (surface.joined[v as usize]
+            || surface.joined[u as usize]
+            || !star.iter().any(|spoke| spoke.touches(u))
+            || keeps_topology(v, u, star, surface, marks))
+}
+
 /// Whether `v` can merge into `u` without a change of topology. `star` is the star of `v`.
 ///
 /// The link condition (Dey, Edelsbrunner, Guha & Nekhayev 1999, "Topology preserving edge contraction"): the two
 /// vertices have no common neighbour but the third corners of the triangles at their edge, and no triangle that the
 /// collapse makes is there already. That `v` leaves a boundary only along it is seen to by the choice of candidates.
 /// The last triangle of a component is kept.
-pub(super) fn keeps_topology(v: u32, u: u32, star: &[Spoke], surface: &Surface, marks: &mut Marks) -> bool {
+fn keeps_topology(v: u32, u: u32, star: &[Spoke], surface: &Surface, marks: &mut Marks) -> bool {
     const NEIGHBOUR: u32 = 0;
     const APEX: u32 = 1;
     marks.clear();
@@ -38,12 +51,12 @@ pub(super) fn keeps_topology(v: u32, u: u32, star: &[Spoke], surface: &Surface, 
         vanishing += 1;
     }
     marks.set(u, APEX);
-    let doubles = star.iter().any(|s| {
-        s.next != u && s.last != u && marks.get(s.next) == Some(APEX) && marks.get(s.last) == Some(APEX)
-    });
+    let doubles = star
+        .iter()
+        .any(|s| !s.touches(u) && marks.get(s.next) == Some(APEX) && marks.get(s.last) == Some(APEX));
     let mut others = 0;
     for spoke in surface.spokes(u) {
-        if spoke.next == v || spoke.last == v {
+        if spoke.touches(v) {
             continue;
         }
         others += 1;
@@ -59,13 +72,13 @@ pub(super) fn keeps_topology(v: u32, u: u32, star: &[Spoke], surface: &Surface, 
 }
 
 /// Whether no triangle of the star of `v` turns over, or loses its area, when `v` moves to where `u` is.
-pub(super) fn keeps_orientation(v: u32, u: u32, star: &[Spoke], surface: &Surface) -> bool {
+fn keeps_orientation(v: u32, u: u32, star: &[Spoke], surface: &Surface) -> bool {
     let (from, to) = (surface.position(v), surface.position(u));
     if from == to {
         return true;
     }
     for spoke in star {
-        if spoke.next == u || spoke.last == u {
+        if spoke.touches(u) {
             continue;
         }
         let (next, last) = (surface.position(spoke.next), surface.position(spoke.last));
@@ -81,7 +94,7 @@ pub(super) fn keeps_orientation(v: u32, u: u32, star: &[Spoke], surface: &Surfac
         if before2 > FLAT_SQUARED * reach * reach {
             return false;
         }
-        let whole = star.iter().fold(glam::Vec3::ZERO, |sum, s| sum + surface.normal(v, s.next, s.last));
+        let whole = star.iter().fold(Vec3::ZERO, |sum, s| sum + surface.normal(v, s.next, s.last));
         if after.dot(whole) < 0.0 {
             return false;
         }

@@ -29,6 +29,8 @@ const ABSOLUTE_SLACK: f64 = 1.0 / (1_u64 << 40) as f64;
 #[derive(Debug)]
 pub(super) struct Nodes {
     pub collapses: Vec<Collapse>,
+    /// For each node, the key of its collapse.
+    pub keys: Vec<f32>,
     /// For each node, the length of the longest chain of predecessors down to the input, counting itself.
     pub depth: Vec<u32>,
     /// For each vertex, the node at which it now stands, or `NONE`.
@@ -45,6 +47,7 @@ impl Nodes {
     pub fn new(leaf_radius: Vec<f32>, extent: f64) -> Nodes {
         Nodes {
             collapses: Vec::with_capacity(leaf_radius.len()),
+            keys: Vec::with_capacity(leaf_radius.len()),
             depth: Vec::with_capacity(leaf_radius.len()),
             top: vec![NONE; leaf_radius.len()],
             leaf_radius,
@@ -67,6 +70,7 @@ impl Nodes {
         positions: [DVec3; 2],
         creators: impl Iterator<Item = u32>,
         error: f32,
+        key: f32,
     ) {
         self.predecessors.clear();
         self.balls.clear();
@@ -78,11 +82,9 @@ impl Nodes {
                 node => self.predecessors.push(node),
             }
         }
-        for node in creators {
-            if node != NONE && !self.predecessors.contains(&node) {
-                self.predecessors.push(node);
-            }
-        }
+        self.predecessors.extend(creators.filter(|&node| node != NONE));
+        self.predecessors.sort_unstable();
+        self.predecessors.dedup();
         let (mut eps, mut depth) = (error, 0);
         for &node in &self.predecessors {
             let b = self.collapses[node as usize].bounds;
@@ -90,7 +92,7 @@ impl Nodes {
             eps = eps.max(b.eps);
             depth = depth.max(self.depth[node as usize]);
         }
-        let center = enclosing_center(&self.balls).as_vec3();
+        let center = enclosing_center(&mut self.balls).as_vec3();
         let radius = radius_around(center.as_dvec3(), &self.balls);
         let radius = round_up((radius + self.slack) * (1.0 + RELATIVE_SLACK));
         self.top[kept as usize] = self.next();
@@ -100,6 +102,7 @@ impl Nodes {
             bounds: Bounds { center: center.to_array(), radius, eps },
         });
         self.depth.push(depth + 1);
+        self.keys.push(key);
     }
 }
 

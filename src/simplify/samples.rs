@@ -2,22 +2,26 @@
 //!
 //! Every removed vertex stays behind as a sample point of the triangle that it lies nearest to, in a linked list
 //! through the vertices. A collapse replaces the star of a vertex; the points of the star, and the vertex itself,
-//! are measured against the triangles that take its place and handed to the nearest. The largest distance is the
-//! error of the collapse: the one-sided Hausdorff distance from the input vertices below to the surface shown
-//! (compare Cohen, Varshney et al., "Simplification envelopes" 1996, and Ciampalini et al., "Multiresolution
-//! decimation based on global error" 1997, who keep points for each triangle in the same way).
+//! are measured against the triangles that take its place and handed to the nearest. The largest distance estimates
+//! the one-sided Hausdorff distance from the input below to the surface shown (Ciampalini, Cignoni, Montani &
+//! Scopigno 1997, "Multiresolution decimation based on global error", keep points for each triangle in this way).
 //!
-//! A vertex that was removed from a boundary, or another edge that does not join exactly two triangles, must stay
-//! close to such an edge, and not to just any triangle: a filled bay is an error although nothing is far from the
+//! Vertices alone are blind to an edge that passes far from the edges it crosses, where neither has a vertex: the
+//! other diagonal of a bent quadrilateral. So the middles of the edges that a collapse makes are measured against the
+//! star that was there before. Without this, cuts of scans and terrain close to full detail measured up to 15 times
+//! their nominal error from the surface shown to the input, with it less than twice.
+//!
+//! A vertex that was removed from a boundary, or from another edge that does not join exactly two triangles, must
+//! stay close to such an edge, and not to just any triangle: a filled bay is an error although nothing is far from the
 //! surface. Such points are measured against the edges when one of them changes.
 
 use glam::Vec3;
 use vertex_tree::NONE;
 
-use super::closest::{Face, segment_distance_squared};
+use super::fan::{Fan, segment_distance_squared};
 
-/// Sample points that a triangle keeps at most. With more, every second goes to those with the largest distances,
-/// the rest are an even selection.
+/// Sample points that a triangle keeps at most. With more, half of the places go to those with the largest distances,
+/// the others to an even selection of the rest.
 const MOST_POINTS: usize = 12;
 
 /// A sample point, the face that it is nearest to, and the squared distance.
@@ -28,53 +32,83 @@ struct Placed {
     point: u32,
 }
 
-/// The sample points of all triangles, and room for measuring one collapse.
+/// An edge that must be kept to, and the face that gets the points near it.
+#[derive(Clone, Copy, Debug)]
+struct SpecialEdge {
+    face: u32,
+    ends: [Vec3; 2],
+}
+
+/// The sample points of all triangles, and the collapse that is being measured.
 #[derive(Debug)]
 pub(super) struct Samples {
     /// The next point of the same triangle, or `NONE`.
     next: Vec<u32>,
-    faces: Vec<(u32, Face)>,
-    /// Edges that the points of special edges must stay close to, and the face that gets them.
-    edges: Vec<(u32, Vec3, Vec3)>,
+    /// What is there before and after the collapse.
+    old: Fan,
+    new: Fan,
+    /// Number of the triangle for each one in `new`.
+    triangles: Vec<u32>,
+    edges: Vec<SpecialEdge>,
     placed: Vec<Placed>,
-    counts: Vec<u32>,
+    worst: f32,
+    /// For each new triangle, the number of its points, later the first of them.
+    lists: Vec<u32>,
 }
 
 impl Samples {
     pub fn new(count: usize) -> Samples {
         Samples {
             next: vec![NONE; count],
-            faces: Vec::new(),
+            old: Fan::default(),
+            new: Fan::default(),
+            triangles: Vec::new(),
             edges: Vec::new(),
             placed: Vec::new(),
-            counts: Vec::new(),
+            worst: 0.0,
+            lists: Vec::new(),
         }
     }
 
-    /// Starts measuring a collapse.
-    pub fn begin(&mut self) {
-        self.faces.clear();
+    /// Starts measuring the collapse of a vertex at `from` into one at `to`.
+    pub fn begin(&mut self, from: Vec3, to: Vec3) {
+        self.old.clear(from);
+        self.new.clear(to);
+        self.triangles.clear();
         self.edges.clear();
         self.placed.clear();
+        self.worst = 0.0;
     }
 
-    /// Adds a triangle that remains after the collapse.
-    pub fn add_face(&mut self, triangle: u32, a: Vec3, b: Vec3, c: Vec3) {
-        self.faces.push((triangle, Face::new(a, b, c)));
+    /// Adds a triangle at `from` that the collapse changes, by its other corners.
+    pub fn add_old(&mut self, b: Vec3, c: Vec3) {
+        self.old.push(b, c);
     }
 
-    /// Whether any triangle has been added.
-    pub fn has_faces(&self) -> bool {
-        !self.faces.is_empty()
+    /// Adds a triangle at `to` that there is after the collapse, by its other corners. Returns its number here.
+    pub fn add_new(&mut self, triangle: u32, b: Vec3, c: Vec3) -> u32 {
+        self.triangles.push(triangle);
+        self.new.push(b, c);
+        self.triangles.len() as u32 - 1
     }
 
-    /// Adds a special edge that remains after the collapse; it belongs to the face of the given number.
-    pub fn add_edge(&mut self, face: u32, a: Vec3, b: Vec3) {
-        self.edges.push((face, a, b));
+    /// Whether there is no triangle after the collapse.
+    pub fn nothing_new(&self) -> bool {
+        self.triangles.is_empty()
     }
 
-    /// Places a list of points; `kept` is what remains where there is no triangle at all. Points that are `special`
-    /// are held to the edges, if there are any.
+    /// Adds a special edge that there is after the collapse; it belongs to the new triangle of the given number.
+    pub fn add_special_edge(&mut self, face: u32, ends: [Vec3; 2]) {
+        self.edges.push(SpecialEdge { face, ends });
+    }
+
+    /// To be called between the adding and the placing.
+    pub fn prepare(&mut self) {
+        self.old.prepare();
+        self.new.prepare();
+    }
+
+    /// Places a list of sample points. `special` says for each vertex whether it is held to the special edges.
     pub fn place_list(&mut self, mut point: u32, positions: &[Vec3], special: &[bool], kept: Vec3) {
         while point != NONE {
             self.place(point, positions, special, kept);
@@ -82,58 +116,54 @@ impl Samples {
         }
     }
 
-    /// Places one point.
+    /// Places one point. What remains where there is no triangle is the point `kept`.
     pub fn place(&mut self, point: u32, positions: &[Vec3], special: &[bool], kept: Vec3) {
         let p = positions[point as usize];
-        let mut placed = Placed { face: NONE, distance_squared: f32::INFINITY, point };
-        if !self.edges.is_empty() && special[point as usize] {
-            for &(face, a, b) in &self.edges {
-                let distance_squared = segment_distance_squared(p, a, b);
-                if distance_squared < placed.distance_squared {
-                    placed = Placed { face, distance_squared, point };
-                }
-            }
+        let (face, distance_squared) = if self.nothing_new() {
+            (NONE, p.distance_squared(kept))
+        } else if !self.edges.is_empty() && special[point as usize] {
+            self.edges.iter().fold((NONE, f32::INFINITY), |nearest, edge| {
+                let distance_squared = segment_distance_squared(p, edge.ends[0], edge.ends[1]);
+                if distance_squared < nearest.1 { (edge.face, distance_squared) } else { nearest }
+            })
         } else {
-            for (face, (_, shape)) in (0..).zip(&self.faces) {
-                let distance_squared = shape.distance_squared(p);
-                if distance_squared < placed.distance_squared {
-                    placed = Placed { face, distance_squared, point };
-                }
-            }
-        }
-        if self.faces.is_empty() {
-            placed.distance_squared = placed.distance_squared.min(p.distance_squared(kept));
-        }
-        self.placed.push(placed);
+            self.new.nearest(p)
+        };
+        self.worst = self.worst.max(distance_squared);
+        self.placed.push(Placed { face, distance_squared, point });
     }
 
-    /// The largest distance of a point that was placed.
+    /// Measures a point of the new triangles against the old ones.
+    pub fn measure_reverse(&mut self, p: Vec3) {
+        self.worst = self.worst.max(self.old.distance_squared(p, self.worst));
+    }
+
+    /// The largest distance so far.
     pub fn error(&self) -> f32 {
-        self.placed.iter().fold(0.0, |worst: f32, p| worst.max(p.distance_squared)).sqrt()
+        self.worst.sqrt()
     }
 
-    /// Hands the points to their triangles. `set_list` is called once for every triangle that was added.
+    /// Hands the points to their triangles. `set_list` is called once for every new triangle.
     pub fn finish(&mut self, mut set_list: impl FnMut(u32, u32)) {
-        self.counts.clear();
-        self.counts.resize(self.faces.len(), 0);
+        self.lists.clear();
+        self.lists.resize(self.triangles.len(), 0);
         for p in &self.placed {
-            if let Some(count) = self.counts.get_mut(p.face as usize) {
+            if let Some(count) = self.lists.get_mut(p.face as usize) {
                 *count += 1;
             }
         }
-        if self.counts.iter().any(|&count| count as usize > MOST_POINTS) {
+        if self.lists.iter().any(|&count| count as usize > MOST_POINTS) {
             self.thin_out();
         }
-        // From here on `counts` holds the heads of the lists.
-        self.counts.fill(NONE);
+        self.lists.fill(NONE);
         for p in &self.placed {
-            if let Some(head) = self.counts.get_mut(p.face as usize) {
-                self.next[p.point as usize] = *head;
-                *head = p.point;
+            if let Some(first) = self.lists.get_mut(p.face as usize) {
+                self.next[p.point as usize] = *first;
+                *first = p.point;
             }
         }
-        for (&(triangle, _), &head) in self.faces.iter().zip(&self.counts) {
-            set_list(triangle, head);
+        for (&triangle, &first) in self.triangles.iter().zip(&self.lists) {
+            set_list(triangle, first);
         }
     }
 
@@ -149,12 +179,10 @@ impl Samples {
         while start < self.placed.len() {
             let face = self.placed[start].face;
             let count = self.placed[start..].iter().take_while(|p| p.face == face).count();
-            let keep = count.min(MOST_POINTS);
-            // The first half of the places goes to the largest distances, the others are spread over the rest.
-            let far = keep.min(MOST_POINTS / 2);
-            for i in 0..keep {
-                let from =
-                    if i < far || count == keep { i } else { far + (i - far) * (count - far) / (keep - far) };
+            let far = count.min(MOST_POINTS / 2);
+            let spread = count.min(MOST_POINTS) - far;
+            for i in 0..far + spread {
+                let from = if i < far { i } else { far + (i - far) * (count - far) / spread };
                 self.placed[kept] = self.placed[start + from];
                 kept += 1;
             }

@@ -3,6 +3,10 @@
 use glam::Vec3;
 use vertex_tree::NONE;
 
+use super::marks::Marks;
+use super::quadric::Quadric;
+use super::virtual_edges::VirtualEdges;
+
 /// A triangle that has not vanished yet.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Triangle {
@@ -14,27 +18,7 @@ pub(super) struct Triangle {
     pub samples: u32,
 }
 
-impl Triangle {
-    pub fn is_alive(&self) -> bool {
-        self.corners[0] != NONE
-    }
-}
-
-/// Triangles, and for each vertex those around it. The stars are brought up to date between rounds: during a round
-/// they still name triangles that have vanished, and lack those that a vertex has gained.
-#[derive(Debug, Default)]
-pub(super) struct Surface {
-    pub positions: Vec<Vec3>,
-    pub triangles: Vec<Triangle>,
-    /// The vertices that are left, ascending.
-    pub live: Vec<u32>,
-    pub removed: Vec<bool>,
-    star_start: Vec<u32>,
-    star_length: Vec<u32>,
-    incident: Vec<u32>,
-}
-
-/// A triangle seen from one of its corners: the other two corners in its orientation.
+/// A triangle seen from one of its corners: the other two in its orientation.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Spoke {
     pub triangle: u32,
@@ -42,17 +26,57 @@ pub(super) struct Spoke {
     pub last: u32,
 }
 
+impl Spoke {
+    /// Whether `v` is one of the other two corners.
+    pub fn touches(&self, v: u32) -> bool {
+        self.next == v || self.last == v
+    }
+}
+
+/// Vertices, triangles, and for each vertex the triangles around it. The stars are brought up to date between rounds:
+/// during a round they still name triangles that have vanished, and lack those that a vertex has gained.
+#[derive(Debug)]
+pub(super) struct Surface {
+    /// In units of the simplification.
+    pub positions: Vec<Vec3>,
+    pub quadrics: Vec<Quadric>,
+    /// Whether the vertex touches an edge that does not join exactly two triangles. Of vertices near a recent change
+    /// it may say so falsely.
+    pub special: Vec<bool>,
+    /// Whether a virtual edge has been collapsed at the vertex, or at one that merged into it.
+    pub joined: Vec<bool>,
+    /// The vertex that has taken the place of a removed one, or `NONE`.
+    pub merged_into: Vec<u32>,
+    pub triangles: Vec<Triangle>,
+    /// The vertices that are left, ascending, without those that never had a triangle.
+    pub live: Vec<u32>,
+    /// Triangles that have not vanished.
+    pub live_triangles: usize,
+    pub virtual_edges: VirtualEdges,
+    star_start: Vec<u32>,
+    star_length: Vec<u32>,
+    incident: Vec<u32>,
+}
+
 impl Surface {
     /// `triangles` must have three different corners each.
-    pub fn new(positions: Vec<Vec3>, corners: impl Iterator<Item = [u32; 3]>) -> Surface {
+    pub fn new(positions: Vec<Vec3>, triangles: &[[u32; 3]]) -> Surface {
         let count = positions.len();
-        let triangles: Vec<Triangle> =
-            corners.map(|corners| Triangle { corners, creator: NONE, samples: NONE }).collect();
+        let mut has_triangle = vec![false; count];
+        for &v in triangles.iter().flatten() {
+            has_triangle[v as usize] = true;
+        }
+        let triangle = |&corners| Triangle { corners, creator: NONE, samples: NONE };
         let mut surface = Surface {
             positions,
-            triangles,
-            live: (0..count as u32).collect(),
-            removed: vec![false; count],
+            quadrics: vec![Quadric::default(); count],
+            special: vec![false; count],
+            joined: vec![false; count],
+            merged_into: vec![NONE; count],
+            triangles: triangles.iter().map(triangle).collect(),
+            live: (0..count as u32).filter(|&v| has_triangle[v as usize]).collect(),
+            live_triangles: triangles.len(),
+            virtual_edges: VirtualEdges::default(),
             star_start: vec![0; count],
             star_length: vec![0; count],
             incident: Vec::new(),
@@ -63,16 +87,13 @@ impl Surface {
 
     /// Drops what has vanished and finds the stars anew, by counting.
     pub fn rebuild_stars(&mut self) {
-        self.triangles.retain(Triangle::is_alive);
-        let removed = &self.removed;
-        self.live.retain(|&v| !removed[v as usize]);
+        self.triangles.retain(|t| t.corners[0] != NONE);
+        self.live.retain(|&v| self.merged_into[v as usize] == NONE);
         for &v in &self.live {
             self.star_length[v as usize] = 0;
         }
-        for t in &self.triangles {
-            for v in t.corners {
-                self.star_length[v as usize] += 1;
-            }
+        for v in self.triangles.iter().flat_map(|t| t.corners) {
+            self.star_length[v as usize] += 1;
         }
         let mut start = 0;
         for &v in &self.live {
@@ -88,19 +109,15 @@ impl Surface {
                 *length += 1;
             }
         }
+        self.virtual_edges.follow(&self.merged_into);
     }
 
-    /// The triangles around `v` when the stars were last rebuilt.
-    pub fn star(&self, v: u32) -> &[u32] {
-        let start = self.star_start[v as usize] as usize;
-        &self.incident[start..start + self.star_length[v as usize] as usize]
-    }
-
-    /// Those of them that are still there and still around `v`.
+    /// The triangles that were around `v` when the stars were last rebuilt, and still are.
     pub fn spokes(&self, v: u32) -> impl Iterator<Item = Spoke> + '_ {
-        self.star(v).iter().filter_map(move |&triangle| {
+        let start = self.star_start[v as usize] as usize;
+        let star = &self.incident[start..start + self.star_length[v as usize] as usize];
+        star.iter().filter_map(move |&triangle| {
             let [a, b, c] = self.triangles[triangle as usize].corners;
-            // A vanished triangle has no vertices, whatever its other two corners say.
             if a == v {
                 Some(Spoke { triangle, next: b, last: c })
             } else if a == NONE {
@@ -115,6 +132,41 @@ impl Surface {
         })
     }
 
+    /// Finds the neighbours of `v`, and the number of triangles at the edge to each.
+    pub fn neighbours(&self, v: u32, marks: &mut Marks, neighbours: &mut Vec<(u32, u32)>) {
+        neighbours.clear();
+        marks.clear();
+        for spoke in self.spokes(v) {
+            for w in [spoke.next, spoke.last] {
+                match marks.get(w) {
+                    Some(i) => neighbours[i as usize].1 += 1,
+                    None => {
+                        marks.set(w, neighbours.len() as u32);
+                        neighbours.push((w, 1));
+                    }
+                }
+            }
+        }
+    }
+
+    /// Whether the triangles around `v` close up: each neighbour comes next in one of them and last in another. A
+    /// vertex of more than a few dozen triangles is not looked at, and the answer is no.
+    pub fn is_surrounded(&self, v: u32) -> bool {
+        const MOST: usize = 24;
+        let (mut next, mut last) = ([0; MOST], [0; MOST]);
+        let count = self.star_length[v as usize] as usize;
+        if count > MOST {
+            return false;
+        }
+        for (i, spoke) in self.spokes(v).enumerate() {
+            (next[i], last[i]) = (spoke.next, spoke.last);
+        }
+        let occurrences = |list: &[u32], w: u32| list.iter().filter(|&&x| x == w).count();
+        next[..count]
+            .iter()
+            .all(|&w| occurrences(&last[..count], w) == 1 && occurrences(&next[..count], w) == 1)
+    }
+
     pub fn position(&self, v: u32) -> Vec3 {
         self.positions[v as usize]
     }
@@ -123,36 +175,5 @@ impl Surface {
     pub fn normal(&self, a: u32, b: u32, c: u32) -> Vec3 {
         let a = self.position(a);
         (self.position(b) - a).cross(self.position(c) - a)
-    }
-}
-
-/// A number for each vertex that is forgotten all at once.
-#[derive(Debug)]
-pub(super) struct Marks {
-    /// The generation in which the mark was set, and its value.
-    entries: Vec<(u32, u32)>,
-    generation: u32,
-}
-
-impl Marks {
-    pub fn new(count: usize) -> Marks {
-        Marks { entries: vec![(0, 0); count], generation: 0 }
-    }
-
-    pub fn clear(&mut self) {
-        if self.generation == u32::MAX {
-            self.entries.fill((0, 0));
-            self.generation = 0;
-        }
-        self.generation += 1;
-    }
-
-    pub fn get(&self, v: u32) -> Option<u32> {
-        let (generation, value) = self.entries[v as usize];
-        (generation == self.generation).then_some(value)
-    }
-
-    pub fn set(&mut self, v: u32, value: u32) {
-        self.entries[v as usize] = (self.generation, value);
     }
 }
