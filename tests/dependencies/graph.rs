@@ -66,7 +66,9 @@ impl Graph {
             }
             if random.below(100) < needing {
                 for _ in 0..=random.below(3) {
-                    let needed = random.below(n);
+                    // Anywhere, or next to it, where two parents of one node may need each other.
+                    let lowest = if random.below(2) == 0 { 0 } else { n.saturating_sub(8) };
+                    let needed = lowest + random.below(n - lowest);
                     graph.needs[n].push(NodeId(needed as u32));
                     graph.needed_by[needed].push(NodeId(n as u32));
                 }
