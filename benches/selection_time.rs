@@ -24,7 +24,8 @@ fn main() {
     let quiet = &mut |_, _| {};
     for kind in SceneKind::ALL {
         let scene = Scene::new(kind);
-        let build = simplify::Options { merge_components: scene.is_many_objects() };
+        let mut build = simplify::Options::default();
+        build.merge_components = scene.is_many_objects();
         let (log, _) = simplify::build(scene.mesh(quiet), &build, quiet).expect("scenes are meshes");
         let rho = if kind == SceneKind::Alps { 50.0 } else { 1.0 };
         let ours = Options {
