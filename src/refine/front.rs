@@ -7,7 +7,7 @@ use multiversion::multiversion;
 use vertex_tree::{Bounds, NodeId};
 
 use super::{Flips, Frame};
-use crate::filter::{Lens, Lenses, classify, doubtful, for_each_bit};
+use crate::filter::{Lens, Lenses, certainly, doubtful, for_each_bit};
 use crate::packed::Packed;
 use crate::queue::Kind;
 
@@ -57,14 +57,11 @@ impl FrontScan {
 fn scan(packed: &Packed, kind: Kind, lenses: Option<&[Lens]>, frame: &Frame, flips: &mut Vec<NodeId>) {
     for (block, used) in packed.blocks() {
         let mask = match lenses {
-            Some(lenses) => {
-                let certainty = classify(block, lenses);
-                // A boundary node flips unless it is certainly not wanted, a collapsible one unless it certainly is.
-                match kind {
-                    Kind::Unfold => doubtful(&certainty.unwanted, used),
-                    Kind::Fold => doubtful(&certainty.wanted, used),
-                }
-            }
+            // A boundary node flips unless it is certainly not wanted, a collapsible one unless it certainly is.
+            Some(lenses) => match kind {
+                Kind::Unfold => doubtful(&certainly::<false>(block, lenses), used),
+                Kind::Fold => doubtful(&certainly::<true>(block, lenses), used),
+            },
             None => (1 << used) - 1,
         };
         for_each_bit(mask, |lane| {
