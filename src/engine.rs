@@ -277,11 +277,17 @@ impl<T: VertexTree, M: MeshSink> Engine<T, M> {
             counts: Counts::default(),
             tests: 0,
         };
-        for &node in &self.flips.fold {
-            step.fold(node)?;
+        for nodes in self.flips.fold.chunks(PREPARED) {
+            step.prepare(nodes);
+            for &node in nodes {
+                step.fold(node)?;
+            }
         }
-        for &node in &self.flips.unfold {
-            step.unfold(node)?;
+        for nodes in self.flips.unfold.chunks(PREPARED) {
+            step.prepare(nodes);
+            for &node in nodes {
+                step.unfold(node)?;
+            }
         }
         let (counts, tests) = (step.counts, self.flips.tests + step.tests);
         let apply = found.elapsed();
@@ -316,6 +322,10 @@ impl<T: VertexTree, M: MeshSink> Engine<T, M> {
     }
 }
 
+/// Changes whose memory is fetched together: enough to keep every channel to it busy, few enough to stay in the
+/// nearest cache.
+const PREPARED: usize = 32;
+
 /// Carries out status changes and what follows from them.
 struct Steps<'a, T, M> {
     tree: &'a mut T,
@@ -329,6 +339,11 @@ struct Steps<'a, T, M> {
 }
 
 impl<T: VertexTree, M: MeshSink> Steps<'_, T, M> {
+    fn prepare(&self, nodes: &[NodeId]) {
+        self.front.prepare(nodes);
+        self.tree.prepare(nodes);
+    }
+
     fn wanted(&mut self, node: NodeId) -> bool {
         self.tests += 1;
         self.frame.unfold(&self.front.bounds(node))
@@ -430,7 +445,8 @@ impl<T: VertexTree, M: MeshSink> Steps<'_, T, M> {
             let above = self.stack.len();
             self.stack.extend(self.tree.children(node).map(Pending::wanted));
             self.retain_above(above, |steps, child| {
-                if !steps.front.is_boundary(&*steps.tree, child) {
+                let is_boundary = T::IS_TREE || steps.front.is_boundary(&*steps.tree, child);
+                if !is_boundary {
                     return false;
                 }
                 let wanted = steps.wanted(child);

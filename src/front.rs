@@ -111,6 +111,11 @@ impl Front {
         !self.is_active(node) && tree.parents(node).all(|p| self.is_active(p))
     }
 
+    /// Reads what changing these nodes will read, for all of them at once: see [`VertexTree::prepare`].
+    pub(crate) fn prepare(&self, nodes: &[NodeId]) {
+        std::hint::black_box(nodes.iter().fold(0, |sum, &node| sum ^ self.record(node).status));
+    }
+
     /// Sphere and error of a node in play.
     #[inline]
     #[must_use]
@@ -191,9 +196,8 @@ impl Front {
     pub(crate) fn set_active<T: VertexTree>(&mut self, tree: &T, node: NodeId) {
         // Each child is linked below its first parent alone: a spanning tree, where the structure is a graph.
         let mut linked = tree
-            .children(node)
-            .filter(|&child| tree.parents(child).next() == Some(node))
-            .map(|child| (child, tree.bounds(child)));
+            .children_and_bounds(node)
+            .filter(|&(child, _)| T::IS_TREE || tree.parents(child).next() == Some(node));
         let mut status = ACTIVE;
         let mut children = match linked.next() {
             None => 0,

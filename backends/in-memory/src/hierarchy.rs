@@ -11,8 +11,9 @@
 
 use vertex_tree::{Bounds, CollapseLog, LogError, NONE, NodeId};
 
-/// An inner node.
+/// An inner node: one cache line that holds all that unfolding it asks for.
 #[derive(Clone, Copy, Debug)]
+#[repr(align(64))]
 pub(crate) struct Node {
     /// The leaves below are `first..end`; those from `pivot` on are below the removed vertex, which is leaf `pivot`.
     pub first: u32,
@@ -22,14 +23,29 @@ pub(crate) struct Node {
     /// The triangles that the node brings start here; they end where those of the next node start.
     pub triangles: u32,
     pub log_number: u32,
+    /// Of the child with the kept vertex and of the other; meaningless where that is a leaf.
+    pub child_bounds: [Bounds; 2],
+}
+
+impl Node {
+    const BLANK: Self = Self {
+        first: 0,
+        pivot: 0,
+        end: 0,
+        parent: NONE,
+        triangles: 0,
+        log_number: 0,
+        child_bounds: [Bounds { center: [0.0; 3], radius: 0.0, eps: 0.0 }; 2],
+    };
 }
 
 /// A collapse log arranged for refinement. Shared, unchanging: several trees can show it at once.
 #[derive(Clone, Debug)]
 pub struct Hierarchy {
     pub(crate) nodes: Vec<Node>,
-    pub(crate) bounds: Vec<Bounds>,
     pub(crate) roots: Vec<NodeId>,
+    /// Of each root.
+    pub(crate) root_bounds: Vec<Bounds>,
     /// The vertices of the base mesh.
     pub(crate) base_vertices: Vec<u32>,
     /// Input vertex of each leaf, and its position.
@@ -61,9 +77,8 @@ impl Hierarchy {
 
         // Numbers, from the roots down: a subtree of m leaves has m - 1 nodes.
         let mut number = vec![0_u32; count];
-        let mut nodes =
-            vec![Node { first: 0, pivot: 0, end: 0, parent: NONE, triangles: 0, log_number: 0 }; count];
-        let mut bounds = vec![Bounds { center: [0.0; 3], radius: 0.0, eps: 0.0 }; count];
+        let mut nodes = vec![Node::BLANK; count];
+        let mut root_bounds = Vec::new();
         let mut input_vertex = vec![0_u32; vertices];
         let mut roots = Vec::new();
         let mut base_vertices = Vec::new();
@@ -77,6 +92,7 @@ impl Hierarchy {
                 number[n] = next_node;
                 nodes[next_node as usize].first = next_leaf;
                 roots.push(NodeId(next_node));
+                root_bounds.push(c.bounds);
                 base_vertices.push(next_leaf);
                 next_node += leaves[n] - 1;
                 next_leaf += leaves[n];
@@ -89,9 +105,10 @@ impl Hierarchy {
             node.pivot = pivot;
             node.end = first + leaves[n];
             node.log_number = n as u32;
-            bounds[id as usize] = c.bounds;
-            for (child, vertex, child_id, child_first) in
+            for (side, (child, vertex, child_id, child_first)) in
                 [(kept, c.kept, id + 1, first), (removed, c.removed, id + left, pivot)]
+                    .into_iter()
+                    .enumerate()
             {
                 if child == NONE {
                     input_vertex[child_first as usize] = vertex;
@@ -99,6 +116,7 @@ impl Hierarchy {
                     number[child as usize] = child_id;
                     nodes[child_id as usize].first = child_first;
                     nodes[child_id as usize].parent = id;
+                    nodes[id as usize].child_bounds[side] = log.collapses[child as usize].bounds;
                 }
             }
         }
@@ -113,8 +131,8 @@ impl Hierarchy {
 
         let mut hierarchy = Self {
             nodes,
-            bounds,
             roots,
+            root_bounds,
             base_vertices,
             positions: input_vertex.iter().map(|&v| log.mesh.positions[v as usize]).collect(),
             input_vertex,

@@ -16,7 +16,7 @@ pub(crate) fn triangle_of(corner: Corner) -> (u32, usize) {
 /// What a triangle needs while it is displayed, within a cache line: its leaves, the vertex that each corner is
 /// at, and its neighbours in the lists of corners at those vertices.
 #[derive(Clone, Copy, Debug)]
-#[repr(align(16))]
+#[repr(align(64))]
 struct Triangle {
     leaves: [u32; 3],
     vertices: [u32; 3],
@@ -46,6 +46,11 @@ impl LiveTriangles {
     pub fn leaf(&self, c: Corner) -> u32 {
         let (t, i) = triangle_of(c);
         self.triangles[t as usize].leaves[i]
+    }
+
+    /// The last triangle.
+    pub fn last(&self) -> u32 {
+        (self.triangles.len() as u32).saturating_sub(1)
     }
 
     pub fn leaves(&self, triangle: u32) -> [u32; 3] {

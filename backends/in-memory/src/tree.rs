@@ -36,8 +36,8 @@ impl InMemoryTree {
         &self.hierarchy
     }
 
-    fn node(&self, node: NodeId) -> Node {
-        self.hierarchy.nodes[node.index()]
+    fn node(&self, node: NodeId) -> &Node {
+        &self.hierarchy.nodes[node.index()]
     }
 
     /// The triangles that a node brings.
@@ -47,6 +47,10 @@ impl InMemoryTree {
     }
 }
 
+/// Lists of corners that are followed at once, and how far: as many triangles as meet at most vertices.
+const PREPARED_CORNERS: usize = 32;
+const PREPARED_STEPS: usize = 7;
+
 /// The vertices at which the corners with these leaves are shown.
 fn shown_at(shown: &LeafSet, leaves: [u32; 3]) -> [u32; 3] {
     // Every tree of the forest shows the first of its leaves at least, so there always is a vertex below.
@@ -54,6 +58,8 @@ fn shown_at(shown: &LeafSet, leaves: [u32; 3]) -> [u32; 3] {
 }
 
 impl VertexTree for InMemoryTree {
+    const IS_TREE: bool = true;
+
     fn node_limit(&self) -> u32 {
         self.hierarchy.nodes.len() as u32
     }
@@ -74,16 +80,24 @@ impl VertexTree for InMemoryTree {
         &self.hierarchy.roots
     }
 
-    #[inline]
     fn bounds(&self, node: NodeId) -> Bounds {
-        self.hierarchy.bounds[node.index()]
+        match self.node(node).parent {
+            // Roots are numbered in ascending order.
+            NONE => self.hierarchy.root_bounds[self.hierarchy.roots.partition_point(|&root| root < node)],
+            parent => self.node(NodeId(parent)).child_bounds[usize::from(node.0 != parent + 1)],
+        }
     }
 
     #[inline]
     fn children(&self, node: NodeId) -> impl Iterator<Item = NodeId> {
-        let Node { first, pivot, end, .. } = self.node(node);
-        let left = (pivot - first > 1).then_some(NodeId(node.0 + 1));
-        let right = (end - pivot > 1).then_some(NodeId(node.0 + (pivot - first)));
+        self.children_and_bounds(node).map(|(child, _)| child)
+    }
+
+    #[inline]
+    fn children_and_bounds(&self, node: NodeId) -> impl Iterator<Item = (NodeId, Bounds)> {
+        let &Node { first, pivot, end, child_bounds, .. } = self.node(node);
+        let left = (pivot - first > 1).then_some((NodeId(node.0 + 1), child_bounds[0]));
+        let right = (end - pivot > 1).then_some((NodeId(node.0 + (pivot - first)), child_bounds[1]));
         left.into_iter().chain(right)
     }
 
@@ -170,11 +184,37 @@ impl VertexTree for InMemoryTree {
         Ok(Step::Done)
     }
 
+    fn prepare(&self, nodes: &[NodeId]) {
+        // What one node needs is a chain of reads each of which must wait for the one before. Taking the first step for
+        // all nodes, then the second, keeps many reads under way at once. The sum is only there to be read.
+        let mut sum = nodes.iter().fold(0, |sum, &n| sum ^ self.node(n).first);
+        if let Some(live) = &self.live {
+            let mut corners = [NONE; PREPARED_CORNERS];
+            for nodes in nodes.chunks(PREPARED_CORNERS / 2) {
+                for (&node, corners) in nodes.iter().zip(corners.chunks_mut(2)) {
+                    let node = self.node(node);
+                    // Whichever way the node changes, one of the two lists has its corners.
+                    corners[0] = live.first_at(node.first);
+                    corners[1] = live.first_at(node.pivot);
+                    sum ^= live.leaves(node.triangles.min(live.last()))[0];
+                }
+                for _ in 0..PREPARED_STEPS {
+                    for corner in &mut corners[..2 * nodes.len()] {
+                        if *corner != NONE {
+                            *corner = live.next(*corner);
+                        }
+                    }
+                }
+                sum ^= corners[0];
+            }
+        }
+        std::hint::black_box(sum);
+    }
+
     fn end_frame(&mut self) -> Result<PageStats, TreeError> {
         let h = &self.hierarchy;
-        let resident_bytes = (h.nodes.len() * (size_of::<Node>() + size_of::<Bounds>())
-            + h.positions.len() * 16
-            + h.corners.len() * 16) as u64;
+        let resident_bytes =
+            (h.nodes.len() * size_of::<Node>() + h.positions.len() * 16 + h.corners.len() * 16) as u64;
         Ok(PageStats { resident_bytes, ..PageStats::default() })
     }
 }

@@ -92,6 +92,10 @@ pub enum TreeError {
 /// is above those. The engine keeps what it needs of the rest, so a backend may drop the pages of active nodes that are
 /// not collapsible.
 pub trait VertexTree {
+    /// Whether no node has more than one structural parent, as in a tree and not in a multi-triangulation. It spares
+    /// the engine a look at the children's own records.
+    const IS_TREE: bool = false;
+
     /// One more than the largest node number.
     fn node_limit(&self) -> u32;
     /// One more than the largest [`VertexId`](crate::VertexId).
@@ -106,6 +110,10 @@ pub trait VertexTree {
     fn bounds(&self, node: NodeId) -> Bounds;
     /// The nodes of which `node` is a structural parent.
     fn children(&self, node: NodeId) -> impl Iterator<Item = NodeId>;
+    /// The children, each with its [`bounds`](Self::bounds): one access for a backend that stores them together.
+    fn children_and_bounds(&self, node: NodeId) -> impl Iterator<Item = (NodeId, Bounds)> {
+        self.children(node).map(|child| (child, self.bounds(child)))
+    }
     /// The structural parents, at least one but for a root, always in the same order.
     fn parents(&self, node: NodeId) -> impl Iterator<Item = NodeId>;
     /// The node's number in the collapse log, by which cuts of different backends can be compared.
@@ -118,6 +126,11 @@ pub trait VertexTree {
     /// Folds a collapsible node: the inverse of [`unfold`](Self::unfold).
     fn fold<M: MeshSink>(&mut self, node: NodeId, mesh: &mut M) -> Result<Step, TreeError>;
 
+    /// Says that these nodes are about to be folded or unfolded: a chance to fetch what that takes into the caches, for
+    /// all of them at once. Changes nothing.
+    fn prepare(&self, nodes: &[NodeId]) {
+        let _ = nodes;
+    }
     /// Says that `node` can not be unfolded before `ticks` ticks of the engine's clock have passed: a prefetch hint.
     fn will_need(&mut self, node: NodeId, ticks: u32) {
         let _ = (node, ticks);

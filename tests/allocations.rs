@@ -1,0 +1,86 @@
+//! A frame in the steady state allocates nothing.
+
+mod common;
+
+use std::alloc::{GlobalAlloc, Layout, System};
+use std::cell::Cell;
+use std::sync::Arc;
+
+use common::{Random, bumpy_grid, random_log, random_view, turn};
+use foldfront::active_mesh::ActiveMesh;
+use foldfront::engine::{Engine, Settings};
+use foldfront::refine::Strategy;
+use foldfront::view::View;
+use in_memory::{Hierarchy, InMemoryTree};
+
+thread_local! {
+    static ALLOCATIONS: Cell<u64> = const { Cell::new(0) };
+}
+
+struct Counting;
+
+// SAFETY: every call is handed on unchanged to the system's allocator.
+#[allow(unsafe_code, reason = "an allocator can not be had without")]
+unsafe impl GlobalAlloc for Counting {
+    unsafe fn alloc(&self, layout: Layout) -> *mut u8 {
+        ALLOCATIONS.set(ALLOCATIONS.get() + 1);
+        // SAFETY: as the caller promises.
+        unsafe { System.alloc(layout) }
+    }
+
+    unsafe fn dealloc(&self, memory: *mut u8, layout: Layout) {
+        // SAFETY: as the caller promises.
+        unsafe { System.dealloc(memory, layout) }
+    }
+
+    unsafe fn realloc(&self, memory: *mut u8, layout: Layout, size: usize) -> *mut u8 {
+        ALLOCATIONS.set(ALLOCATIONS.get() + 1);
+        // SAFETY: as the caller promises.
+        unsafe { System.realloc(memory, layout, size) }
+    }
+}
+
+#[global_allocator]
+static ALLOCATOR: Counting = Counting;
+
+#[test]
+fn a_path_that_has_been_walked_before_allocates_nothing() {
+    for strategy in [Strategy::TopDown, Strategy::Front, Strategy::Event] {
+        let mut random = Random(21);
+        let log = random_log(bumpy_grid(40, &mut random), &mut random);
+        let tree = InMemoryTree::new(Arc::new(Hierarchy::new(&log).unwrap()));
+        let mesh = ActiveMesh::new(&tree);
+        let settings = Settings { strategy, rho: 0.01, omega: 0.01, ..Settings::default() };
+        let mut engine = Engine::new(tree, mesh, settings).unwrap();
+        // There and back again, so that the end of one round is the start of the next.
+        let mut view = random_view(&mut random);
+        let mut views: Vec<View> = Vec::new();
+        for _ in 0..150 {
+            view.eye -= view.eye * 0.002;
+            turn(&mut view, 0.004, &mut random);
+            views.push(view);
+        }
+        views.extend_from_within(1..149);
+        views[150..].reverse();
+        let mut walk = |rounds: usize| {
+            let before = ALLOCATIONS.get();
+            let mut changes = 0;
+            for view in std::iter::repeat_n(&views, rounds).flatten() {
+                let report = engine.advance(std::slice::from_ref(view)).unwrap();
+                engine.mesh_mut().clear_changes();
+                changes += report.unfolds + report.folds;
+            }
+            (ALLOCATIONS.get() - before, changes)
+        };
+        // Buffers grow to what the path asks for. The queue's buckets also depend on where the clock stands: rarely,
+        // one grows later.
+        let (first, _) = walk(200);
+        let (later, changes) = walk(20);
+        assert!(first > 0 && changes > 1000, "{strategy:?}: {first} allocations, {changes} changes");
+        let frames = 20 * views.len() as u64;
+        assert!(later <= frames / 100, "{strategy:?}: {later} allocations in {frames} frames");
+        if strategy != Strategy::Event {
+            assert_eq!(later, 0, "{strategy:?}");
+        }
+    }
+}
