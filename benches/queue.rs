@@ -14,9 +14,10 @@ fn frames_ahead(node: u32) -> f64 {
 }
 
 fn filled() -> EventQueue {
-    let mut queue = EventQueue::new(EVENTS);
+    let mut queue = EventQueue::new(EVENTS, 1);
     for node in 0..EVENTS {
-        queue.schedule(0.0, frames_ahead(node), NodeId(node), Kind::Unfold, BOUNDS);
+        let event = queue.event(NodeId(node), Kind::Unfold, BOUNDS);
+        queue.schedule(0, 0.0, frames_ahead(node), event);
     }
     queue
 }
@@ -40,9 +41,9 @@ fn operations(criterion: &mut Criterion) {
                 for frame in 1..=50 {
                     let now = f64::from(frame);
                     due.clear();
-                    queue.advance(now, true, &mut due);
+                    queue.advance(0, now, &mut due);
                     for event in &due {
-                        queue.reschedule(now, frames_ahead(event.node.0), *event);
+                        queue.schedule(0, now, frames_ahead(event.node.0), *event);
                     }
                 }
             },

@@ -128,7 +128,7 @@ impl Criterion {
     fn earliest_unfold_for(self, view: &View, speed: &Speed, bounds: &Bounds) -> f64 {
         let s = Situation::new(self, view, bounds);
         let visible = speed.frames(s.gap - s.slack, speed.rho + speed.omega * s.d);
-        let coarse = speed.frames(s.d - s.reach - s.slack, speed.rho + speed.kappa * s.reach_slope);
+        let coarse = speed.frames(s.d - s.reach - s.reach_slack, speed.rho + speed.kappa * s.reach_slope);
         visible.max(coarse)
     }
 
@@ -147,7 +147,7 @@ impl Criterion {
         let s = Situation::new(self, view, bounds);
         let outside = speed.frames(s.r - s.d - s.slack, speed.rho);
         let invisible = speed.frames(-s.gap - s.slack, speed.rho + speed.omega * s.d);
-        let fine = speed.frames(s.reach - s.d - s.slack, speed.rho + speed.kappa * s.reach_slope);
+        let fine = speed.frames(s.reach - s.d - s.reach_slack, speed.rho + speed.kappa * s.reach_slope);
         outside.max(invisible.min(fine))
     }
 }
@@ -163,8 +163,9 @@ struct Situation {
     /// Distance within which the node is coarse, and how fast that grows with `k`.
     reach: f64,
     reach_slope: f64,
-    /// More than rounding can have changed any of the differences above.
+    /// More than rounding can have changed a difference of the lengths above, and one with `reach`.
     slack: f64,
+    reach_slack: f64,
 }
 
 impl Situation {
@@ -185,6 +186,7 @@ impl Situation {
         };
         let (reach, reach_slope) = criterion.reach(bounds, view.k);
         // p near the axis is only good to sqrt(epsilon) d, but there f is far from both marks unless r is larger.
-        Self { d, r, gap: f - r, reach, reach_slope, slack: SLACK * (d + reach) }
+        let (slack, reach_slack) = (SLACK * (d + r), SLACK * (d + reach));
+        Self { d, r, gap: f - r, reach, reach_slope, slack, reach_slack }
     }
 }

@@ -69,12 +69,14 @@ pub mod criterion;
 pub mod cut;
 pub mod deviation;
 pub mod engine;
+mod filter;
 pub mod front;
 mod frustum;
 pub mod mesh_io;
 pub mod motion;
 pub mod oracle;
 pub mod output;
+mod packed;
 mod parallel;
 pub mod path;
 #[cfg(feature = "cli")]
