@@ -127,9 +127,11 @@ impl Four {
     fn distances_squared(&self, p: Vec3) -> Vec4 {
         let p = p.to_array().map(Vec4::splat);
         let (b, c) = (self.b, self.c);
-        let edges = past_edge(p, b, self.per_bb)
-            .min(past_edge(p, c, self.per_cc))
-            .min(past_edge(minus(p, b), minus(c, b), self.per_ee));
+        let edges = past_edge(p, b, self.per_bb).min(past_edge(p, c, self.per_cc)).min(past_edge(
+            minus(p, b),
+            minus(c, b),
+            self.per_ee,
+        ));
         let (s, t) = (dot(p, self.c_cross_n), dot(p, self.n_cross_b));
         let inside = s.cmpgt(Vec4::ZERO) & t.cmpgt(Vec4::ZERO) & (s + t).cmplt(self.nn);
         let height = dot(p, self.n);
