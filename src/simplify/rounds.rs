@@ -45,6 +45,8 @@ pub(super) struct Builder {
     marks: Marks,
     /// The star of the vertex in question.
     star: Vec<Spoke>,
+    /// Vertices that lose a triangle and get none of the new ones.
+    bereaved: Vec<u32>,
     /// Triangles that stand in where nothing takes the place of the star.
     others: Vec<u32>,
     /// Whether to join components.
@@ -62,6 +64,7 @@ impl Builder {
             samples: Samples::new(count),
             marks,
             star: Vec::new(),
+            bereaved: Vec::new(),
             others: Vec::new(),
             merge,
         }
@@ -178,8 +181,7 @@ impl Builder {
             return;
         }
         let u = self.candidates.target[v as usize];
-        let top = self.nodes.top[u as usize];
-        if self.surface.merged_into[u as usize] != NONE || (top != NONE && top >= first) {
+        if self.surface.merged_into[u as usize] != NONE || is_from(self.nodes.top[u as usize], first) {
             return;
         }
         self.star.clear();
@@ -194,6 +196,10 @@ impl Builder {
             self.find_legal(v);
             return;
         }
+        self.find_bereaved(u);
+        if self.bereaved.iter().any(|&w| is_from(self.nodes.trace[w as usize], first)) {
+            return;
+        }
         let error = self.measure(v, u);
         let key = (MEASURED_WEIGHT * error * error).max(self.candidates.key[v as usize]);
         self.candidates.key[v as usize] = key;
@@ -206,6 +212,17 @@ impl Builder {
         self.collapse(v, u, error);
     }
 
+    /// Finds the corners of triangles of `self.star` that vanish at the merge into `u` which are in none that remains.
+    fn find_bereaved(&mut self, u: u32) {
+        self.bereaved.clear();
+        for s in self.star.iter().filter(|s| s.touches(u)) {
+            let apex = if s.next == u { s.last } else { s.next };
+            if !self.star.iter().any(|s| s.touches(apex) && !s.touches(u)) {
+                self.bereaved.push(apex);
+            }
+        }
+    }
+
     /// Merges `v`, whose star is in `self.star`, into `u`, which has just been measured.
     fn collapse(&mut self, v: u32, u: u32, error: f32) {
         let surface = &mut self.surface;
@@ -213,7 +230,8 @@ impl Builder {
         let node = self.nodes.next();
         let creators = self.star.iter().map(|s| surface.triangles[s.triangle as usize].creator);
         let key = self.candidates.key[v as usize];
-        self.nodes.add([v, u], [from.as_dvec3(), to.as_dvec3()], creators, round_up(f64::from(error)), key);
+        let positions = [from.as_dvec3(), to.as_dvec3()];
+        self.nodes.add([v, u], positions, creators, &self.bereaved, round_up(f64::from(error)), key);
 
         let joined = self.star.iter().any(|s| s.touches(u));
         // Where all is regular, a legal collapse keeps it so.
@@ -279,6 +297,13 @@ impl Builder {
         }
         samples.prepare();
         samples.place(v, &surface.positions, &surface.special, to);
+        if self.star.iter().all(|s| s.touches(u)) {
+            for w in self.star.iter().flat_map(|s| [s.next, s.last]) {
+                if surface.spokes(w).all(|s| s.touches(v)) {
+                    samples.measure_lost(surface.position(w), to);
+                }
+            }
+        }
         for t in self.star.iter().map(|s| &s.triangle).chain(&self.others) {
             let list = surface.triangles[*t as usize].samples;
             samples.place_list(list, &surface.positions, &surface.special, to);
@@ -319,6 +344,11 @@ impl Builder {
 
 /// Times the average distance of vertices: beyond this, no pair is left to be found.
 const FARTHEST_REACH: f32 = 1e6;
+
+/// Whether `node` is one of the round whose first node is given.
+fn is_from(node: u32, first: u32) -> bool {
+    node != NONE && node >= first
+}
 
 /// Adds the special edges that remain around a special vertex, whose star is given, once it has merged into `u`.
 fn add_special_edges(u: u32, star: &[Spoke], surface: &Surface, samples: &mut Samples, marks: &mut Marks) {

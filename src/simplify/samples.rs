@@ -132,6 +132,13 @@ impl Samples {
         self.placed.push(Placed { face, distance_squared, point });
     }
 
+    /// Measures a vertex that is left without triangles.
+    pub fn measure_lost(&mut self, p: Vec3, kept: Vec3) {
+        let distance_squared =
+            if self.nothing_new() { p.distance_squared(kept) } else { self.new.nearest(p).1 };
+        self.worst = self.worst.max(distance_squared);
+    }
+
     /// Measures a point of the new triangles against the old ones.
     pub fn measure_reverse(&mut self, p: Vec3) {
         self.worst = self.worst.max(self.old.distance_squared(p, self.worst));
