@@ -1,7 +1,8 @@
 //! The command line: arguments, and what each command does with the library.
 //!
-//! Errors are one line on standard error. Exit code 1 says that something failed, 2 that the command was not
-//! understood.
+//! Errors are one line on standard error that starts with `foldfront: `. Exit code 1 says that something failed, 2
+//! that the command was not understood. A command that fails leaves the files that it would have written as they
+//! were.
 
 mod arguments;
 mod compare;
@@ -14,7 +15,9 @@ mod progress;
 use std::io::Write;
 use std::process::ExitCode;
 
+use anyhow::Context;
 use clap::Parser;
+use clap::error::ErrorKind;
 
 use arguments::{Arguments, Command};
 
@@ -25,8 +28,16 @@ pub fn main() -> ExitCode {
         Ok(arguments) => arguments,
         Err(error) => {
             // Help and version also arrive here, and are no failure.
-            let _ = error.print();
-            return if error.use_stderr() { ExitCode::from(2) } else { ExitCode::SUCCESS };
+            if !error.use_stderr() {
+                let _ = error.print();
+                return ExitCode::SUCCESS;
+            }
+            match error.kind() {
+                // Nothing was asked for: the way to find out what can be.
+                ErrorKind::DisplayHelpOnMissingArgumentOrSubcommand => drop(error.print()),
+                _ => complain(&usage_line(&error)),
+            }
+            return ExitCode::from(2);
         }
     };
     let result = match arguments.command {
@@ -46,15 +57,62 @@ pub fn main() -> ExitCode {
             if error.chain().any(is_broken_pipe) {
                 return ExitCode::SUCCESS;
             }
-            let line = format!("{error:#}").replace('\n', " ");
-            let _ = writeln!(std::io::stderr(), "foldfront: {line}");
+            complain(&failure_line(&error));
             ExitCode::FAILURE
         }
     }
 }
 
+/// Says on standard error what went wrong, in one line.
+fn complain(what: &str) {
+    let _ = writeln!(std::io::stderr(), "foldfront: {}", what.replace(['\n', '\r'], " "));
+}
+
+/// An error and its causes, but for those that it names itself.
+fn failure_line(error: &anyhow::Error) -> String {
+    let mut line = error.to_string();
+    for cause in error.chain().skip(1).map(ToString::to_string) {
+        if !line.ends_with(&cause) {
+            line = format!("{line}: {cause}");
+        }
+    }
+    line
+}
+
+/// What the argument parser has to say, without its page of advice.
+fn usage_line(error: &clap::Error) -> String {
+    let text = error.render().to_string();
+    let text = text.strip_prefix("error: ").unwrap_or(&text);
+    let paragraphs = text
+        .split("\n\n")
+        .take_while(|paragraph| !paragraph.starts_with("Usage:") && !paragraph.starts_with("For more"))
+        .map(|paragraph| paragraph.split_whitespace().collect::<Vec<_>>().join(" "));
+    paragraphs.collect::<Vec<_>>().join("; ")
+}
+
 fn is_broken_pipe(cause: &(dyn std::error::Error + 'static)) -> bool {
     cause.downcast_ref::<std::io::Error>().is_some_and(|e| e.kind() == std::io::ErrorKind::BrokenPipe)
+}
+
+/// Whether a file could be written there: said before the work, not after it.
+fn check_writable(file: &std::path::Path) -> anyhow::Result<()> {
+    let folder = match file.parent() {
+        Some(parent) if !parent.as_os_str().is_empty() => parent,
+        _ => std::path::Path::new("."),
+    };
+    anyhow::ensure!(!file.is_dir(), "{}: is a folder", file.display());
+    // A rename would put a file in the place of /dev/null.
+    anyhow::ensure!(!file.exists() || file.is_file(), "{}: is not a file", file.display());
+    tempfile::tempfile_in(folder).with_context(|| file.display().to_string())?;
+    Ok(())
+}
+
+/// Whether files could be written to a folder, which is made when it is needed.
+fn check_folder(folder: &std::path::Path) -> anyhow::Result<()> {
+    let there = folder.ancestors().find(|f| f.exists()).unwrap_or(std::path::Path::new("."));
+    anyhow::ensure!(there.is_dir(), "{}: is not a folder", there.display());
+    tempfile::tempfile_in(there).with_context(|| folder.display().to_string())?;
+    Ok(())
 }
 
 /// Writes to standard output, whose reader may have gone.

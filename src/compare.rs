@@ -183,7 +183,8 @@ impl Subject {
         frame: usize,
         options: &Options,
     ) -> Result<Engine<InMemoryTree, ActiveMesh>, CompareError> {
-        let settings = Settings { strategy: Strategy::TopDown, criterion: options.criterion, ..Settings::default() };
+        let settings =
+            Settings { strategy: Strategy::TopDown, criterion: options.criterion, ..Settings::default() };
         let mut engine = self.engine(settings, ActiveMesh::new)?;
         let view = View::new(&path.camera(frame), options.theta);
         engine.advance(&[view]).map_err(|source| self.tree_error(source))?;

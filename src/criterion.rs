@@ -39,6 +39,19 @@ pub enum Criterion {
     SphereSize,
 }
 
+/// Whether whatever view wants `inner` must want `outer` too: the outer sphere contains the inner and has no less
+/// error, with room for the rounding of the predicate.
+#[must_use]
+pub fn is_nested(inner: &Bounds, outer: &Bounds) -> bool {
+    if inner == outer {
+        return true;
+    }
+    let center = |bounds: &Bounds| glam::DVec3::from(bounds.center.map(f64::from));
+    let room = f64::from(outer.radius) - f64::from(inner.radius) - center(inner).distance(center(outer));
+    // Half of the relative slack that construction leaves.
+    room >= f64::from(outer.radius) * 2.0_f64.powi(-21) && outer.eps >= inner.eps
+}
+
 /// Shares of a numerator that a time bound gives up, so that rounding never makes it late.
 const SLACK: f64 = 1e-9;
 
@@ -115,7 +128,7 @@ impl Criterion {
     fn earliest_unfold_for(self, view: &View, speed: &Speed, bounds: &Bounds) -> f64 {
         let s = Situation::new(self, view, bounds);
         let visible = speed.frames(s.gap - s.slack, speed.rho + speed.omega * s.d);
-        let coarse = speed.frames(s.d - s.reach - s.slack, speed.rho + speed.kappa * s.reach_slope);
+        let coarse = speed.frames(s.d - s.reach - s.reach_slack, speed.rho + speed.kappa * s.reach_slope);
         visible.max(coarse)
     }
 
@@ -134,7 +147,7 @@ impl Criterion {
         let s = Situation::new(self, view, bounds);
         let outside = speed.frames(s.r - s.d - s.slack, speed.rho);
         let invisible = speed.frames(-s.gap - s.slack, speed.rho + speed.omega * s.d);
-        let fine = speed.frames(s.reach - s.d - s.slack, speed.rho + speed.kappa * s.reach_slope);
+        let fine = speed.frames(s.reach - s.d - s.reach_slack, speed.rho + speed.kappa * s.reach_slope);
         outside.max(invisible.min(fine))
     }
 }
@@ -150,8 +163,9 @@ struct Situation {
     /// Distance within which the node is coarse, and how fast that grows with `k`.
     reach: f64,
     reach_slope: f64,
-    /// More than rounding can have changed any of the differences above.
+    /// More than rounding can have changed a difference of the lengths above, and one with `reach`.
     slack: f64,
+    reach_slack: f64,
 }
 
 impl Situation {
@@ -172,6 +186,7 @@ impl Situation {
         };
         let (reach, reach_slope) = criterion.reach(bounds, view.k);
         // p near the axis is only good to sqrt(epsilon) d, but there f is far from both marks unless r is larger.
-        Self { d, r, gap: f - r, reach, reach_slope, slack: SLACK * (d + reach) }
+        let (slack, reach_slack) = (SLACK * (d + r), SLACK * (d + reach));
+        Self { d, r, gap: f - r, reach, reach_slope, slack, reach_slack }
     }
 }

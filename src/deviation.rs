@@ -123,14 +123,11 @@ impl<'a> Reference<'a> {
     #[must_use]
     pub fn deviation(&self, displayed: &Mesh, camera: &Camera, lines: u32) -> Deviation {
         let view = View::new(camera, lines, NEAR * self.extent);
-        let seen: Vec<Seen> = parallel::map_chunks(displayed.triangles.len(), CHUNK, |range| {
-            range.map(|t| view.seen(corners(displayed, t))).collect::<Vec<_>>()
-        })
-        .concat();
+        let seen = view.all_seen(displayed);
         let mut deviation = Deviation {
             lines,
             triangles: displayed.triangles.len(),
-            triangles_in_view: seen.iter().filter(|&&seen| seen != Seen::Nothing).count(),
+            triangles_in_view: count_in_view(&seen),
             flipped_triangles: 0,
             degenerate_triangles: 0,
             forward: self.forward(displayed, &seen, &view),
@@ -138,6 +135,12 @@ impl<'a> Reference<'a> {
         };
         self.reverse(displayed, &seen, &view, &mut deviation);
         deviation
+    }
+
+    /// How many triangles of a mesh have any part in view.
+    #[must_use]
+    pub fn triangles_in_view(&self, displayed: &Mesh, camera: &Camera) -> usize {
+        count_in_view(&View::new(camera, 1, NEAR * self.extent).all_seen(displayed))
     }
 
     fn forward(&self, displayed: &Mesh, seen: &[Seen], view: &View) -> Direction {
@@ -216,7 +219,19 @@ struct View {
     near: f64,
 }
 
+fn count_in_view(seen: &[Seen]) -> usize {
+    seen.iter().filter(|&&seen| seen != Seen::Nothing).count()
+}
+
 impl View {
+    /// How much of each triangle of a mesh is in view.
+    fn all_seen(&self, mesh: &Mesh) -> Vec<Seen> {
+        parallel::map_chunks(mesh.triangles.len(), CHUNK, |range| {
+            range.map(|t| self.seen(corners(mesh, t))).collect::<Vec<_>>()
+        })
+        .concat()
+    }
+
     fn new(camera: &Camera, lines: u32, near: f64) -> Self {
         // A single point as original has no extent; any near plane will do for it.
         let near = near.max(f64::MIN_POSITIVE);
@@ -281,6 +296,34 @@ fn corners(mesh: &Mesh, triangle: usize) -> [DVec3; 3] {
 /// Of twice the triangle's area in length.
 fn normal([a, b, c]: [DVec3; 3]) -> DVec3 {
     (b - a).cross(c - a)
+}
+
+impl std::fmt::Display for Deviation {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        writeln!(
+            f,
+            "{} triangles displayed, {} in view, {} of these flipped, {} without area; pixels of {} lines:",
+            self.triangles,
+            self.triangles_in_view,
+            self.flipped_triangles,
+            self.degenerate_triangles,
+            self.lines
+        )?;
+        writeln!(f, "{:40} {:>9} {:>9} {:>9} {:>9}", "", "samples", "median", "99 %", "largest")?;
+        for (name, figures) in [
+            ("original to displayed", &self.forward.inner),
+            ("displayed to original", &self.reverse.inner),
+            ("original to displayed, at the border", &self.forward.border),
+            ("displayed to original, at the border", &self.reverse.border),
+        ] {
+            writeln!(
+                f,
+                "{name:40} {:>9} {:>9.3} {:>9.3} {:>9.3}",
+                figures.count, figures.median, figures.p99, figures.max
+            )?;
+        }
+        Ok(())
+    }
 }
 
 #[cfg(feature = "cli")]

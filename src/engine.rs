@@ -133,7 +133,6 @@ pub struct Engine<T, M> {
     tree: T,
     mesh: M,
     front: Front,
-    roots: Vec<NodeId>,
     finder: Finder,
     settings: Settings,
     odometer: Odometer,
@@ -155,7 +154,7 @@ impl<T: VertexTree, M: MeshSink> Engine<T, M> {
     /// What the backend reports.
     pub fn new(mut tree: T, mut mesh: M, settings: Settings) -> Result<Self, TreeError> {
         let limit = tree.node_limit();
-        let roots = tree.roots().to_vec();
+        let roots: Vec<_> = tree.roots().iter().map(|&root| (root, tree.bounds(root))).collect();
         let mut front = Front::new(limit);
         let mut finder = Finder::new(settings.strategy, limit);
         // No views yet: every root is due, whatever the first frame brings.
@@ -163,12 +162,10 @@ impl<T: VertexTree, M: MeshSink> Engine<T, M> {
             criterion: settings.criterion,
             views: &[],
             speed: Speed { rho: settings.rho, omega: settings.omega, kappa: 0.0 },
-            now: 0.0,
             motion: crate::motion::Motion::Unbounded,
         };
-        for &root in &roots {
-            let bounds = tree.bounds(root);
-            front.add_root(root, bounds);
+        front.add_roots(&roots);
+        for (root, bounds) in roots {
             finder.watch(&frame, root, Kind::Unfold, bounds);
         }
         tree.base_mesh(&mut mesh)?;
@@ -176,7 +173,6 @@ impl<T: VertexTree, M: MeshSink> Engine<T, M> {
             tree,
             mesh,
             front,
-            roots,
             finder,
             settings,
             odometer: Odometer::default(),
@@ -234,7 +230,7 @@ impl<T: VertexTree, M: MeshSink> Engine<T, M> {
 
     /// Calls `f` with every active node.
     pub fn for_each_active(&self, f: impl FnMut(NodeId)) {
-        self.front.for_each_active(&self.roots, f);
+        self.front.for_each_active(f);
     }
 
     /// Moves the front to where these views want it. A node unfolds if any of them wants it: two for stereo, one
@@ -263,13 +259,12 @@ impl<T: VertexTree, M: MeshSink> Engine<T, M> {
         if redeclared {
             motion = crate::motion::Motion::Unbounded;
         }
-        let now = self.odometer.now();
-        let frame = Frame { criterion: self.settings.criterion, views: &self.views, speed, now, motion };
+        let frame = Frame { criterion: self.settings.criterion, views: &self.views, speed, motion };
 
         self.flips.unfold.clear();
         self.flips.fold.clear();
         self.flips.tests = 0;
-        self.finder.find(&frame, &self.before, &self.roots, &self.front, &mut self.flips);
+        self.finder.find(&frame, &self.before, &self.front, &mut self.flips);
 
         let found = Instant::now();
         let mut step = Steps {
@@ -290,6 +285,7 @@ impl<T: VertexTree, M: MeshSink> Engine<T, M> {
         }
         let (counts, tests) = (step.counts, self.flips.tests + step.tests);
         let apply = found.elapsed();
+        self.finder.settle(&frame);
         let pages = self.tree.end_frame()?;
         let select = start.elapsed();
 

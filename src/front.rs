@@ -1,64 +1,107 @@
 //! The active front: which nodes are unfolded, and the compact record that is kept of each node in play.
 //!
 //! A node is *in play* while all its structural parents are active (or it is a root): active nodes and boundary
-//! nodes. For these the front keeps sphere and error, and the links that a top-down traversal follows, in a flat
-//! array indexed by node number. The array is zeroed memory that the operating system provides when it is touched,
-//! so nodes that were never in play cost address space only; and as backends number nodes depth-first, a traversal
-//! reads it in sequence.
+//! nodes. For these the front keeps sphere and error, and the links that a top-down traversal follows, in records that
+//! come and go with them. The records of two siblings share a cache line, and all of them lie together however sparse
+//! the nodes in play are among all nodes: what a frame reads fits the caches if the front does, not the hierarchy.
 
-use vertex_tree::{Bounds, NodeId, VertexTree};
+use slab::Slab;
+use vertex_tree::{Bounds, NONE, NodeId, VertexTree};
 
 /// A node's record: half a cache line.
-#[derive(Clone, Copy, bytemuck::Pod, bytemuck::Zeroable)]
+#[derive(Clone, Copy)]
 #[repr(C)]
-struct Record {
-    bounds: Bounds,
-    /// [`FOLDED`], [`ACTIVE_WITHOUT_CHILDREN`], or a node number plus [`FIRST_CHILD`].
+pub(crate) struct Record {
+    pub bounds: Bounds,
+    /// [`NONE`] where a pair has only one node.
+    pub node: NodeId,
+    /// While active: the pair of the children linked below the node, 0 for none. With [`MANY`], an index into
+    /// [`Front::many`] instead.
+    children: u32,
+    /// [`ACTIVE`], [`MANY`], and how many structural children are active.
     status: u32,
-    /// Next child of the same first parent: a node number plus 1, or 0.
-    next_sibling: u32,
-    /// How many structural children are active.
-    active_children: u32,
 }
 
-const FOLDED: u32 = 0;
-const ACTIVE_WITHOUT_CHILDREN: u32 = 1;
-const FIRST_CHILD: u32 = 2;
+impl Record {
+    const BLANK: Self = Self {
+        bounds: Bounds { center: [0.0; 3], radius: 0.0, eps: 0.0 },
+        node: NodeId(NONE),
+        children: 0,
+        status: 0,
+    };
+
+    #[inline(always)]
+    pub fn is_active(&self) -> bool {
+        self.status & ACTIVE != 0
+    }
+
+    #[inline(always)]
+    pub fn is_collapsible(&self) -> bool {
+        self.status & (ACTIVE | ACTIVE_CHILDREN) == ACTIVE
+    }
+}
+
+/// The records of two siblings, in a cache line.
+#[derive(Clone, Copy)]
+#[repr(align(64))]
+pub(crate) struct Pair(pub [Record; 2]);
+
+const ACTIVE: u32 = 1 << 31;
+const MANY: u32 = 1 << 30;
+const ACTIVE_CHILDREN: u32 = MANY - 1;
 
 /// The nodes in play.
 pub struct Front {
-    records: Vec<Record>,
+    /// For each node in play, where its record is: twice its pair, plus 1 if it is the second. Pair 0 belongs to no
+    /// node and stands for those that are not in play.
+    slots: Vec<u32>,
+    pairs: Vec<Pair>,
+    /// Pairs to use again, last in, first out.
+    free: Vec<u32>,
+    /// Pairs of the children of nodes that have more than two, as they do in a multi-triangulation.
+    many: Slab<Vec<u32>>,
+    roots: Vec<u32>,
     active: usize,
     hash: u64,
 }
 
-/// What top-down traversal reads of a node in one go.
-pub(crate) struct Visit {
-    pub bounds: Bounds,
-    pub active: bool,
-    /// First child, if the node is active and has one.
-    pub first_child: Option<NodeId>,
-    pub next_sibling: Option<NodeId>,
-}
-
 impl Front {
     pub(crate) fn new(node_limit: u32) -> Self {
-        Self { records: bytemuck::allocation::zeroed_vec(node_limit as usize), active: 0, hash: 0 }
+        Self {
+            slots: vec![0; node_limit as usize],
+            pairs: vec![Pair([Record::BLANK; 2])],
+            free: Vec::new(),
+            many: Slab::new(),
+            roots: Vec::new(),
+            active: 0,
+            hash: 0,
+        }
+    }
+
+    #[inline(always)]
+    fn record(&self, node: NodeId) -> &Record {
+        let slot = self.slots[node.index()] as usize;
+        &self.pairs[slot / 2].0[slot % 2]
+    }
+
+    #[inline(always)]
+    fn record_mut(&mut self, node: NodeId) -> &mut Record {
+        let slot = self.slots[node.index()] as usize;
+        &mut self.pairs[slot / 2].0[slot % 2]
     }
 
     /// Whether the node is unfolded.
     #[inline]
     #[must_use]
     pub fn is_active(&self, node: NodeId) -> bool {
-        self.records[node.index()].status != FOLDED
+        self.record(node).is_active()
     }
 
     /// Whether the node is unfolded and can be folded next: all its structural children are folded.
     #[inline]
     #[must_use]
     pub fn is_collapsible(&self, node: NodeId) -> bool {
-        let record = &self.records[node.index()];
-        record.status != FOLDED && record.active_children == 0
+        self.record(node).is_collapsible()
     }
 
     /// Whether the node is folded and can be unfolded next: all its structural parents are active.
@@ -72,7 +115,7 @@ impl Front {
     #[inline]
     #[must_use]
     pub fn bounds(&self, node: NodeId) -> Bounds {
-        self.records[node.index()].bounds
+        self.record(node).bounds
     }
 
     /// How many nodes are unfolded.
@@ -88,36 +131,91 @@ impl Front {
         self.hash
     }
 
+    /// The pairs of the roots.
+    pub(crate) fn root_pairs(&self) -> &[u32] {
+        &self.roots
+    }
+
     #[inline(always)]
-    pub(crate) fn visit(&self, node: NodeId) -> Visit {
-        let record = &self.records[node.index()];
-        Visit {
-            bounds: record.bounds,
-            active: record.status != FOLDED,
-            first_child: (record.status >= FIRST_CHILD).then(|| NodeId(record.status - FIRST_CHILD)),
-            next_sibling: record.next_sibling.checked_sub(1).map(NodeId),
+    pub(crate) fn pair(&self, pair: u32) -> &[Record; 2] {
+        &self.pairs[pair as usize].0
+    }
+
+    /// Appends the pairs of the nodes linked below a node to `below`.
+    #[inline(always)]
+    pub(crate) fn descend(&self, record: &Record, below: &mut Vec<u32>) {
+        if record.children == 0 {
+        } else if record.status & MANY == 0 {
+            below.push(record.children);
+        } else {
+            below.extend_from_slice(&self.many[record.children as usize - 1]);
         }
     }
 
-    /// A root comes into play.
-    pub(crate) fn add_root(&mut self, node: NodeId, bounds: Bounds) {
-        self.records[node.index()].bounds = bounds;
+    /// Makes records for two nodes, or one.
+    fn add_pair(&mut self, nodes: [Option<(NodeId, Bounds)>; 2]) -> u32 {
+        let pair = self.free.pop().unwrap_or_else(|| {
+            self.pairs.push(Pair([Record::BLANK; 2]));
+            self.pairs.len() as u32 - 1
+        });
+        for (side, node) in nodes.into_iter().enumerate() {
+            let record =
+                node.map_or(Record::BLANK, |(node, bounds)| Record { bounds, node, ..Record::BLANK });
+            self.pairs[pair as usize].0[side] = record;
+            if let Some((node, _)) = node {
+                self.slots[node.index()] = 2 * pair + side as u32;
+            }
+        }
+        pair
+    }
+
+    fn remove_pair(&mut self, pair: u32) {
+        for record in self.pairs[pair as usize].0 {
+            if record.node.0 != NONE {
+                self.slots[record.node.index()] = 0;
+            }
+        }
+        self.pairs[pair as usize] = Pair([Record::BLANK; 2]);
+        self.free.push(pair);
+    }
+
+    /// Roots come into play.
+    pub(crate) fn add_roots(&mut self, roots: &[(NodeId, Bounds)]) {
+        for two in roots.chunks(2) {
+            let pair = self.add_pair([Some(two[0]), two.get(1).copied()]);
+            self.roots.push(pair);
+        }
     }
 
     /// Records that `node` has been unfolded, and that its children come into play.
     pub(crate) fn set_active<T: VertexTree>(&mut self, tree: &T, node: NodeId) {
-        let mut first = ACTIVE_WITHOUT_CHILDREN;
         // Each child is linked below its first parent alone: a spanning tree, where the structure is a graph.
-        for child in tree.children(node).filter(|&c| tree.parents(c).next() == Some(node)) {
-            let next_sibling = if first == ACTIVE_WITHOUT_CHILDREN { 0 } else { first - FIRST_CHILD + 1 };
-            let record = &mut self.records[child.index()];
-            record.bounds = tree.bounds(child);
-            record.next_sibling = next_sibling;
-            first = child.0 + FIRST_CHILD;
+        let mut linked = tree
+            .children(node)
+            .filter(|&child| tree.parents(child).next() == Some(node))
+            .map(|child| (child, tree.bounds(child)));
+        let mut status = ACTIVE;
+        let mut children = match linked.next() {
+            None => 0,
+            Some(first) => self.add_pair([Some(first), linked.next()]),
+        };
+        if let Some(mut next) = linked.next() {
+            let mut pairs = vec![children];
+            loop {
+                let after = linked.next();
+                pairs.push(self.add_pair([Some(next), after]));
+                let Some(following) = after.and_then(|_| linked.next()) else { break };
+                next = following;
+            }
+            status |= MANY;
+            children = self.many.insert(pairs) as u32 + 1;
         }
-        self.records[node.index()].status = first;
+        drop(linked);
+        let record = self.record_mut(node);
+        record.status = status;
+        record.children = children;
         for parent in tree.parents(node) {
-            self.records[parent.index()].active_children += 1;
+            self.record_mut(parent).status += 1;
         }
         self.active += 1;
         self.hash = self.hash.wrapping_add(mix(tree.log_number(node)));
@@ -125,24 +223,34 @@ impl Front {
 
     /// Records that `node` has been folded.
     pub(crate) fn set_folded<T: VertexTree>(&mut self, tree: &T, node: NodeId) {
-        self.records[node.index()].status = FOLDED;
+        let record = self.record_mut(node);
+        let (status, children) = (record.status, record.children);
+        record.status = 0;
+        record.children = 0;
+        if status & MANY != 0 {
+            for pair in self.many.remove(children as usize - 1) {
+                self.remove_pair(pair);
+            }
+        } else if children != 0 {
+            self.remove_pair(children);
+        }
         for parent in tree.parents(node) {
-            self.records[parent.index()].active_children -= 1;
+            self.record_mut(parent).status -= 1;
         }
         self.active -= 1;
         self.hash = self.hash.wrapping_sub(mix(tree.log_number(node)));
     }
 
     /// Calls `f` with every active node, parents before the children linked below them.
-    pub fn for_each_active(&self, roots: &[NodeId], mut f: impl FnMut(NodeId)) {
-        let mut stack = roots.to_vec();
-        while let Some(node) = stack.pop() {
-            let visit = self.visit(node);
-            if visit.active {
-                f(node);
+    pub fn for_each_active(&self, mut f: impl FnMut(NodeId)) {
+        let mut stack = self.roots.clone();
+        while let Some(pair) = stack.pop() {
+            for record in self.pair(pair) {
+                if record.is_active() {
+                    f(record.node);
+                    self.descend(record, &mut stack);
+                }
             }
-            stack.extend(visit.next_sibling);
-            stack.extend(visit.first_child);
         }
     }
 }

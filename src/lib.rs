@@ -1,18 +1,82 @@
 //! Event-driven view-dependent level of detail.
+//!
+//! A mesh is simplified once into a forest of vertex merges. At run time an *active front* through that forest is
+//! the displayed mesh, and each frame the front must follow the camera. Classic systems test every node of the front
+//! in every frame. Here a node is tested only when the camera could have changed the answer (Zach & Karner 2003),
+//! with time bounds that never miss, so the displayed mesh is in every frame exactly the one that testing every
+//! node would give.
+//!
+//! ```
+//! use std::sync::Arc;
+//!
+//! use foldfront::active_mesh::ActiveMesh;
+//! use foldfront::engine::{Engine, Settings};
+//! use foldfront::glam::DVec3;
+//! use foldfront::in_memory::{Hierarchy, InMemoryTree};
+//! use foldfront::simplify;
+//! use foldfront::view::{Camera, View, theta_of_pixels};
+//! use foldfront::Mesh;
+//!
+//! # fn main() -> Result<(), Box<dyn std::error::Error>> {
+//! // Once a model: a hierarchy. `mesh_io::read` reads files; this is a bumpy square of 2 by 2 units.
+//! let mut mesh = Mesh::default();
+//! for i in 0..64 * 64 {
+//!     let (x, y) = ((i % 64) as f32 / 32.0 - 1.0, (i / 64) as f32 / 32.0 - 1.0);
+//!     mesh.positions.push([x, y, 0.1 * (x * x * 9.0).fract() * y]);
+//! }
+//! for i in (0..63 * 64).filter(|i| i % 64 != 63) {
+//!     mesh.triangles.push([i, i + 1, i + 65]);
+//!     mesh.triangles.push([i, i + 65, i + 64]);
+//! }
+//! let (log, _) = simplify::build(mesh, &simplify::Options::default(), &mut |_, _| {})?;
+//! let hierarchy = Arc::new(Hierarchy::new(&log)?);
+//!
+//! // Once a viewer: an engine, with the displayed mesh as vertex and index buffers.
+//! let tree = InMemoryTree::new(hierarchy);
+//! let buffers = ActiveMesh::new(&tree);
+//! // How fast the camera is expected to move: object units and radians a frame. A faster one is no less exact.
+//! let settings = Settings { rho: 0.02, omega: 0.02, ..Settings::default() };
+//! let mut engine = Engine::new(tree, buffers, settings)?;
+//!
+//! // Every frame: say where the camera is, upload what changed, draw.
+//! for frame in 0..60 {
+//!     let eye = DVec3::new(0.02 * f64::from(frame), -2.0, 1.0);
+//!     let camera = Camera::look_at(eye, DVec3::ZERO, DVec3::Z, 1.0, 16.0 / 9.0);
+//!     let report = engine.advance(&[View::new(&camera, theta_of_pixels(1.0, 1080))])?;
+//!     let buffers = engine.mesh_mut();
+//!     for &slot in buffers.changed_triangles() {
+//!         // Upload `buffers.triangles()[slot]`, unless the slot is not used any more.
+//!         let _ = buffers.triangles().get(slot as usize);
+//!     }
+//!     buffers.clear_changes();
+//!     assert_eq!(report.triangles, buffers.triangles().len() as u64);
+//! }
+//! # Ok(())
+//! # }
+//! ```
+//!
+//! Data flows one way: input ([`mesh_io`], [`scene`]), hierarchy ([`simplify`], [`CollapseLog`]), a backend behind
+//! the [`VertexTree`] trait, the [`engine`] with its [`front`], and the displayed mesh ([`active_mesh`]).
 
 pub mod active_mesh;
 pub mod budget;
 pub mod bvh;
+#[cfg(feature = "cli")]
+pub mod cli;
+#[cfg(feature = "cli")]
+pub mod compare;
 pub mod criterion;
 pub mod cut;
 pub mod deviation;
 pub mod engine;
+mod filter;
 pub mod front;
 mod frustum;
 pub mod mesh_io;
 pub mod motion;
 pub mod oracle;
 pub mod output;
+mod packed;
 mod parallel;
 pub mod path;
 #[cfg(feature = "cli")]
@@ -21,9 +85,14 @@ pub mod progress;
 pub mod queue;
 pub mod refine;
 pub mod render;
+#[cfg(feature = "cli")]
+pub mod report;
 pub mod scene;
 pub mod simplify;
 pub mod view;
 
+pub use glam;
+#[cfg(feature = "in-memory")]
+pub use in_memory;
 pub use vertex_tree;
-pub use vertex_tree::{Bounds, Collapse, CollapseLog, Mesh, NodeId};
+pub use vertex_tree::{Bounds, Collapse, CollapseLog, Mesh, NodeId, VertexTree};

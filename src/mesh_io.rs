@@ -13,8 +13,10 @@
 //!
 //! Vertices are neither split nor merged (but for STL, which has none), so that their numbers are those of the file,
 //! and unused ones are kept. Polygons are triangulated, whether convex or not. What has no surface is left out: a
-//! face with fewer than three corners, and a triangle that names a vertex twice. Terrain lies in the xy plane with
-//! x to the east, y to the north and z up, its middle at the origin.
+//! face with fewer than three corners, and a triangle that names a vertex twice.
+//!
+//! Terrain lies in the xy plane with x to the east, y to the north and z up, its middle at the origin. Where there
+//! are voids, it has holes: triangles with a void corner, and samples that no other triangle uses, are left out.
 //!
 //! A file that is damaged, or was made to do harm, gives an error; it never takes more memory than a small multiple
 //! of its (uncompressed) length.

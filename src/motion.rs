@@ -55,32 +55,60 @@ impl Odometer {
 
     /// Advances by the motion from the views of the last frame to those of this one.
     pub fn advance(&mut self, speed: &Speed, before: &[View], after: &[View]) -> Motion {
-        let motion = Self::motion(speed, before, after);
+        match Travel::between(before, after) {
+            Some(travel) => self.advance_by(speed, &travel),
+            None => Motion::Unbounded,
+        }
+    }
+
+    /// Advances by a motion.
+    pub(crate) fn advance_by(&mut self, speed: &Speed, travel: &Travel) -> Motion {
+        let motion = travel.on_clock(speed);
         if let Motion::Frames(frames) = motion {
             // Millions of small steps must not be rounded away either.
             self.now = (self.now + frames).next_up();
         }
         motion
     }
+}
 
-    fn motion(speed: &Speed, before: &[View], after: &[View]) -> Motion {
+/// How far the views have moved from one frame to the next: the most that any of them has in each way.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Travel {
+    moved: f64,
+    turned: f64,
+    steered: f64,
+    is_rest: bool,
+}
+
+impl Travel {
+    /// `None` if the views can not be compared.
+    pub fn between(before: &[View], after: &[View]) -> Option<Self> {
         if before.len() != after.len() || !before.iter().zip(after).all(|(b, a)| b.same_cone(a)) {
-            return Motion::Unbounded;
+            return None;
         }
-        let mut frames = 0.0_f64;
+        let mut travel = Self { moved: 0.0, turned: 0.0, steered: 0.0, is_rest: before == after };
         for (b, a) in before.iter().zip(after) {
-            let moved = a.eye.distance(b.eye);
             // acos of a dot product is 0 for slow pans, and the clock would stand still.
             let turned =
                 2.0 * (a.direction - b.direction).length().atan2((a.direction + b.direction).length());
-            let steered = (a.k - b.k).abs();
-            for (amount, rate) in [(moved, speed.rho), (turned, speed.omega), (steered, speed.kappa)] {
-                if amount > 0.0 {
-                    frames = frames.max(amount / rate);
-                }
+            travel.moved = travel.moved.max(a.eye.distance(b.eye));
+            travel.turned = travel.turned.max(turned);
+            travel.steered = travel.steered.max((a.k - b.k).abs());
+        }
+        Some(travel)
+    }
+
+    fn on_clock(&self, speed: &Speed) -> Motion {
+        let mut frames = 0.0_f64;
+        for (amount, rate) in
+            [(self.moved, speed.rho), (self.turned, speed.omega), (self.steered, speed.kappa)]
+        {
+            if amount > 0.0 {
+                frames = frames.max(amount / rate);
             }
         }
-        if frames == 0.0 && before == after {
+        if frames == 0.0 && self.is_rest {
             Motion::Rest
         } else if frames < 1e9 {
             // A motion too small for its own arithmetic to see still ticks.

@@ -56,8 +56,11 @@ impl Oracle {
 
     /// Finds the cut for these views.
     pub fn cut(&mut self, criterion: Criterion, views: &[View]) -> &[bool] {
-        for (active, bounds) in self.active.iter_mut().zip(&self.bounds) {
-            *active = criterion.unfold(views, bounds);
+        let nodes = self.active.iter_mut().zip(&self.bounds);
+        match views {
+            // One view is the rule, and worth a loop without a loop in it.
+            [view] => nodes.for_each(|(active, bounds)| *active = criterion.unfold_for(view, bounds)),
+            _ => nodes.for_each(|(active, bounds)| *active = criterion.unfold(views, bounds)),
         }
         // Children come before their parents in the log, so one pass closes upwards.
         (self.hash, self.count) = (0, 0);

@@ -1,1 +1,61 @@
-//! TODO
+//! Walkthroughs: a camera recorded frame by frame.
+//!
+//! A path file is text in the order of the TUM RGB-D benchmark, one frame a line, `t x y z qx qy qz qw`: seconds,
+//! eye position in object space, and the rotation from camera space (looking along -z, y up) to object space. Lines
+//! that start with `#` before the frames are the header. See [`Path::parse`].
+
+mod around;
+mod director;
+mod format;
+mod generate;
+pub mod import;
+mod summary;
+
+use glam::{DQuat, DVec3};
+
+pub use around::around;
+pub use format::PathError;
+pub use generate::{generate, recorded};
+pub use summary::{Motion, Summary};
+
+use crate::view::Camera;
+
+/// A recorded walkthrough. What [`Path::read`] returns has at least one frame, strictly increasing finite times, and
+/// unit quaternions.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Path {
+    /// Name for tables and file names.
+    pub name: String,
+    /// Unit of length of the positions, as in `m`.
+    pub units: String,
+    /// Full vertical field of view, in radians, above 0 and below pi.
+    pub fov_y: f64,
+    /// Width over height of the image.
+    pub aspect: f64,
+    /// The frames, in order of time.
+    pub frames: Vec<Pose>,
+}
+
+/// The camera at one frame.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Pose {
+    /// Seconds.
+    pub time: f64,
+    /// Eye position, in object space.
+    pub position: DVec3,
+    /// Rotation from camera space to object space; the camera looks along its -z with y up.
+    pub orientation: DQuat,
+}
+
+impl Path {
+    /// The camera at a frame.
+    ///
+    /// # Panics
+    ///
+    /// If there is no such frame.
+    #[must_use]
+    pub fn camera(&self, frame: usize) -> Camera {
+        let Pose { position, orientation, .. } = self.frames[frame];
+        Camera { position, orientation, fov_y: self.fov_y, aspect: self.aspect }
+    }
+}

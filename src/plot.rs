@@ -1,1 +1,343 @@
-//! TODO
+//! Curves over the frames of a walkthrough, as one SVG picture.
+//!
+//! The colours are those of Okabe & Ito (2002), which can be told apart with any kind of colour vision. Text is left
+//! to the viewer's sans-serif font.
+
+// Plots are off the selection path.
+#![allow(clippy::disallowed_methods, reason = "off the selection path")]
+
+mod axis;
+
+use plotters::coord::Shift;
+use plotters::coord::types::RangedCoordf64;
+use plotters::prelude::*;
+use plotters::style::text_anchor::{HPos, Pos, VPos};
+
+use axis::{Axis, moving_median, outline};
+
+/// Size of the picture in CSS pixels, without the rows of the legend beyond the first.
+const SIZE: (i32, i32) = (960, 440);
+/// Left, right and bottom margins, and the one at the top above the legend.
+const LEFT: i32 = 76;
+const RIGHT: i32 = 24;
+const BOTTOM: i32 = 58;
+const TOP: i32 = 40;
+/// Height of a row of the legend.
+const LEGEND_ROW: i32 = 22;
+/// Length of the line that stands for a curve in the legend, and the room around it.
+const SWATCH: i32 = 26;
+const GAP: i32 = 8;
+/// The backend's coordinates are integers; it draws on a canvas that is larger by this factor, for the picture to be
+/// scaled down again by whoever shows it.
+const FINE: i32 = 5;
+/// Points of a curve for each pixel of the plot's width, at most: the highest and the lowest of the frames there.
+const POINTS: usize = 2;
+
+const TEXT: RGBColor = RGBColor(0x33, 0x3b, 0x47);
+const FRAME: RGBColor = RGBColor(0x8b, 0x93, 0x9f);
+const GRID: RGBColor = RGBColor(0xe4, 0xe7, 0xec);
+const PALETTE: [RGBColor; 7] = [
+    RGBColor(0x00, 0x72, 0xb2),
+    RGBColor(0xd5, 0x5e, 0x00),
+    RGBColor(0x00, 0x9e, 0x73),
+    RGBColor(0xcc, 0x79, 0xa7),
+    RGBColor(0xe6, 0x9f, 0x00),
+    RGBColor(0x56, 0xb4, 0xe9),
+    RGBColor(0x20, 0x20, 0x20),
+];
+
+/// What a plot says about itself, and how it is drawn.
+#[derive(Clone, Copy, Debug, Default)]
+pub struct Plot<'a> {
+    /// Heading.
+    pub title: &'a str,
+    /// What is counted to the right.
+    pub x_label: &'a str,
+    /// What is measured upwards, with its unit.
+    pub y_label: &'a str,
+    /// Number of the frame to which the first value of each series belongs.
+    pub first_frame: usize,
+    /// Whether values are drawn by their logarithms. Values that are not positive are then left out.
+    pub logarithmic: bool,
+    /// Frames in the window of a moving median, drawn over the then faint curve itself; below 2, none is drawn.
+    pub median_window: usize,
+}
+
+/// One curve.
+#[derive(Clone, Copy, Debug)]
+pub struct Series<'a> {
+    /// Its name in the legend.
+    pub name: &'a str,
+    /// A value for each frame. Where one is not finite, the curve has a gap.
+    pub values: &'a [f64],
+    /// Which of the seven colours it gets, counted modulo their number.
+    pub colour: usize,
+}
+
+/// A plot could not be drawn.
+#[derive(Debug, thiserror::Error)]
+#[error("plot {title:?}: {source}")]
+pub struct PlotError {
+    title: String,
+    source: DrawingAreaErrorKind<std::io::Error>,
+}
+
+type Canvas<'a> = DrawingArea<SVGBackend<'a>, Shift>;
+type Drawn = Result<(), DrawingAreaErrorKind<std::io::Error>>;
+
+/// Draws the curves, as the text of an SVG file.
+///
+/// The range of values is that of 99.8 % of each series, so that a single spike does not flatten everything; where
+/// a curve leaves it, a small triangle at the upper edge says so.
+///
+/// # Errors
+/// What the drawing library says; it has no reason to fail.
+pub fn curves(plot: &Plot, series: &[Series]) -> Result<String, PlotError> {
+    let legend = Legend::new(series);
+    let (width, height) = (SIZE.0, SIZE.1 + legend.rows * LEGEND_ROW);
+    let mut svg = String::new();
+    let draw = |svg: &mut String| {
+        let size = ((width * FINE) as u32, (height * FINE) as u32);
+        let canvas = SVGBackend::with_string(svg, size).into_drawing_area();
+        canvas.fill(&WHITE)?;
+        canvas.draw(&text(plot.title, (LEFT, 24), 16.0, (HPos::Left, VPos::Center), FontTransform::None))?;
+        legend.draw(&canvas, series)?;
+        draw_curves(&canvas, plot, series, TOP + legend.rows * LEGEND_ROW, height - BOTTOM)?;
+        canvas.present()
+    };
+    draw(&mut svg).map_err(|source| PlotError { title: plot.title.to_owned(), source })?;
+    // The canvas stays as fine as it was drawn, the picture gets its size.
+    let fine = format!("width=\"{}\" height=\"{}\"", width * FINE, height * FINE);
+    Ok(svg.replacen(&fine, &format!("width=\"{width}\" height=\"{height}\""), 1))
+}
+
+/// Puts pictures that [`curves`] drew below each other, as one.
+#[must_use]
+pub fn stack(pictures: &[String]) -> String {
+    // Each starts with the size that `curves` gave it.
+    let height = |svg: &String| -> i32 {
+        svg.split_once("height=\"")
+            .and_then(|(_, rest)| rest.split('"').next()?.parse().ok())
+            .unwrap_or(SIZE.1)
+    };
+    let total: i32 = pictures.iter().map(height).sum();
+    let mut stacked = format!(
+        "<svg width=\"{0}\" height=\"{total}\" viewBox=\"0 0 {0} {total}\" xmlns=\"http://www.w3.org/2000/svg\">\n",
+        SIZE.0
+    );
+    let mut y = 0;
+    for picture in pictures {
+        stacked.push_str(&picture.replacen("<svg ", &format!("<svg y=\"{y}\" "), 1));
+        y += height(picture);
+    }
+    stacked.push_str("</svg>\n");
+    stacked
+}
+
+/// Draws axes, grid and curves between the lines `top` and `bottom` of the picture.
+fn draw_curves(canvas: &Canvas, plot: &Plot, series: &[Series], top: i32, bottom: i32) -> Drawn {
+    let (left, right) = (LEFT, SIZE.0 - RIGHT);
+    let frames = series.iter().map(|s| s.values.len()).max().unwrap_or(0);
+    let x = Axis::frames(plot.first_frame, frames);
+    let values: Vec<&[f64]> = series.iter().map(|s| s.values).collect();
+    let y = Axis::values(&values, plot.logarithmic);
+    let area = canvas.clone().apply_coord_spec(Cartesian2d::<RangedCoordf64, RangedCoordf64>::new(
+        x.ends[0]..x.ends[1],
+        y.ends[0]..y.ends[1],
+        (left * FINE..right * FINE, bottom * FINE..top * FINE),
+    ));
+
+    let grid = GRID.stroke_width(FINE as u32);
+    let pixel = |at: (f64, f64)| {
+        let (x, y) = area.map_coordinate(&at);
+        (x / FINE, y / FINE)
+    };
+    for (at, label) in &x.ticks {
+        area.draw(&PathElement::new([(*at, y.ends[0]), (*at, y.ends[1])], grid))?;
+        let below = (pixel((*at, y.ends[0])).0, bottom + 8);
+        canvas.draw(&text(label, below, 12.0, (HPos::Center, VPos::Top), FontTransform::None))?;
+    }
+    for (at, label) in &y.ticks {
+        area.draw(&PathElement::new([(x.ends[0], *at), (x.ends[1], *at)], grid))?;
+        let beside = (left - 8, pixel((x.ends[0], *at)).1);
+        canvas.draw(&text(label, beside, 12.0, (HPos::Right, VPos::Center), FontTransform::None))?;
+    }
+    let middle = (left + right) / 2;
+    let center = (HPos::Center, VPos::Center);
+    canvas.draw(&text(plot.x_label, (middle, bottom + 40), 13.0, center, FontTransform::None))?;
+    let middle = (top + bottom) / 2;
+    canvas.draw(&text(plot.y_label, (20, middle), 13.0, center, FontTransform::Rotate270))?;
+
+    let columns = (right - left) as usize;
+    let curve = |values: &[f64], style: ShapeStyle| -> Drawn {
+        for points in outline(values, columns, POINTS) {
+            let at = |&(frame, value): &(usize, f64)| {
+                ((plot.first_frame + frame) as f64, y.place(value).min(y.ends[1]).max(y.ends[0]))
+            };
+            area.draw(&PathElement::new(points.iter().map(at).collect::<Vec<_>>(), style))?;
+        }
+        Ok(())
+    };
+    let smooth = plot.median_window > 1;
+    for s in series {
+        let raw = if smooth { colour(s).mix(0.28) } else { colour(s).mix(1.0) };
+        curve(&finite_places(s.values, &y), raw.stroke_width(FINE as u32))?;
+    }
+    for s in series.iter().filter(|_| smooth) {
+        let median = moving_median(&finite_places(s.values, &y), plot.median_window);
+        curve(&median, colour(s).stroke_width(2 * FINE as u32))?;
+    }
+    for s in series {
+        let mut free_from = i32::MIN;
+        for (frame, &value) in s.values.iter().enumerate() {
+            let (x, _) = pixel(((plot.first_frame + frame) as f64, y.ends[1]));
+            if value.is_finite() && y.place(value) > y.ends[1] && x >= free_from {
+                let triangle =
+                    [(x - 4, top + 7), (x + 4, top + 7), (x, top)].map(|(x, y)| (x * FINE, y * FINE));
+                canvas.draw(&Polygon::new(triangle, colour(s).filled()))?;
+                free_from = x + 9;
+            }
+        }
+    }
+
+    let corners = [(left, top), (left, bottom), (right, bottom)].map(|(x, y)| (x * FINE, y * FINE));
+    canvas.draw(&PathElement::new(corners, FRAME.stroke_width(FINE as u32)))
+}
+
+/// The values with gaps, as NaN, where there is no place on the axis.
+fn finite_places(values: &[f64], y: &Axis) -> Vec<f64> {
+    values.iter().map(|&v| if y.place(v).is_finite() { v } else { f64::NAN }).collect()
+}
+
+fn colour(series: &Series) -> RGBColor {
+    PALETTE[series.colour % PALETTE.len()]
+}
+
+/// Text of `size` CSS pixels, anchored at a place in the picture.
+fn text<'a>(
+    content: &'a str,
+    (x, y): (i32, i32),
+    size: f64,
+    (h, v): (HPos, VPos),
+    turned: FontTransform,
+) -> Text<'a, (i32, i32), &'a str> {
+    // The backend writes font sizes divided by this.
+    const BACKEND_SCALE: f64 = 1.24;
+    let font = ("sans-serif", size * BACKEND_SCALE * f64::from(FINE)).into_font().transform(turned);
+    Text::new(content, (x * FINE, y * FINE), font.color(&TEXT).pos(Pos::new(h, v)))
+}
+
+/// Where the names of the curves stand: in rows below the title.
+struct Legend {
+    /// Left end and row of each series' entry.
+    places: Vec<(i32, i32)>,
+    rows: i32,
+}
+
+impl Legend {
+    fn new(series: &[Series]) -> Self {
+        let (mut x, mut row) = (LEFT, 0);
+        let mut places = Vec::new();
+        for s in series {
+            // There are no font metrics; this is a wide estimate for a size of 13.
+            let width = SWATCH + 3 * GAP + (7.6 * s.name.chars().count().min(1000) as f64) as i32;
+            if x + width > SIZE.0 - RIGHT && x > LEFT {
+                (x, row) = (LEFT, row + 1);
+            }
+            places.push((x, row));
+            x += width;
+        }
+        Self { places, rows: row + 1 }
+    }
+
+    fn draw(&self, canvas: &Canvas, series: &[Series]) -> Drawn {
+        for (s, &(x, row)) in series.iter().zip(&self.places) {
+            let y = TOP + row * LEGEND_ROW + LEGEND_ROW / 2 - 2;
+            let line = [(x * FINE, y * FINE), ((x + SWATCH) * FINE, y * FINE)];
+            canvas.draw(&PathElement::new(line, colour(s).stroke_width(3 * FINE as u32)))?;
+            let beside = (x + SWATCH + GAP, y);
+            canvas.draw(&text(s.name, beside, 13.0, (HPos::Left, VPos::Center), FontTransform::None))?;
+        }
+        Ok(())
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const PLOT: Plot = Plot {
+        title: "Selection",
+        x_label: "frame",
+        y_label: "time (ms)",
+        first_frame: 100,
+        logarithmic: false,
+        median_window: 0,
+    };
+
+    fn series(values: &[f64]) -> Series<'_> {
+        Series { name: "top-down <1>", values, colour: 0 }
+    }
+
+    fn count(svg: &str, what: &str) -> usize {
+        svg.matches(what).count()
+    }
+
+    #[test]
+    fn a_plot_says_what_it_shows() {
+        let svg = curves(&PLOT, &[series(&[1.0, 3.0, 2.0])]).unwrap();
+        assert!(svg.starts_with("<svg width=\"960\" height=\"462\" viewBox=\"0 0 4800 2310\""));
+        for expected in ["Selection", "frame", "time (ms)", "top-down &lt;1&gt;", ">\n100\n<", ">\n102\n<"] {
+            assert!(svg.contains(expected), "{expected} is missing");
+        }
+        assert_eq!(svg, curves(&PLOT, &[series(&[1.0, 3.0, 2.0])]).unwrap());
+    }
+
+    /// One swatch in the legend, and a line for each stretch without a gap.
+    #[test]
+    fn what_is_not_finite_is_a_gap() {
+        let lines = |values: &[f64]| {
+            let svg = curves(&PLOT, &[series(values)]).unwrap();
+            count(&svg, "stroke=\"#0072B2\"") - 1
+        };
+        assert_eq!(lines(&[1.0, 2.0, 3.0, 4.0]), 1);
+        assert_eq!(lines(&[1.0, 2.0, f64::NAN, 3.0, 4.0]), 2);
+        assert_eq!(lines(&[f64::INFINITY, f64::NAN]), 0);
+        assert_eq!(lines(&[]), 0);
+    }
+
+    #[test]
+    fn a_spike_is_clipped_and_marked() {
+        let mut values: Vec<f64> = (0..1000).map(|i| 1.0 + f64::from(i % 7)).collect();
+        assert_eq!(count(&curves(&PLOT, &[series(&values)]).unwrap(), "<polygon"), 0);
+        values[500] = 1e6;
+        let svg = curves(&PLOT, &[series(&values)]).unwrap();
+        assert_eq!(count(&svg, "<polygon"), 1);
+        assert!(svg.contains(">\n7\n<") && !svg.contains(">\n10000"), "the axis is that of the other values");
+    }
+
+    #[test]
+    fn a_median_is_drawn_over_each_curve() {
+        let values = [1.0, 2.0, 3.0, 4.0];
+        let svg = curves(&Plot { median_window: 3, ..PLOT }, &[series(&values)]).unwrap();
+        assert_eq!(count(&svg, "stroke=\"#0072B2\""), 3, "swatch, curve and median");
+        assert_eq!(count(&svg, "opacity=\"0.28\" stroke=\"#0072B2\""), 1);
+    }
+
+    #[test]
+    fn logarithms_leave_out_what_is_not_positive() {
+        let plot = Plot { logarithmic: true, ..PLOT };
+        let svg = curves(&plot, &[series(&[0.1, 1.0, 0.0, 10.0, 100.0])]).unwrap();
+        assert_eq!(count(&svg, "stroke=\"#0072B2\""), 3);
+        for expected in [">\n0.1\n<", ">\n1\n<", ">\n10\n<", ">\n100\n<"] {
+            assert!(svg.contains(expected), "{expected} is missing");
+        }
+    }
+
+    #[test]
+    fn a_long_legend_takes_more_rows() {
+        let many = vec![Series { name: "in-memory, event-published", values: &[1.0, 2.0], colour: 9 }; 7];
+        let svg = curves(&PLOT, &many).unwrap();
+        assert!(svg.starts_with("<svg width=\"960\" height=\"506\""), "three rows of legend: {}", &svg[..40]);
+    }
+}

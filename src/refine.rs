@@ -55,8 +55,6 @@ pub(crate) struct Frame<'a> {
     pub criterion: Criterion,
     pub views: &'a [View],
     pub speed: Speed,
-    /// Time on the odometer clock.
-    pub now: f64,
     pub motion: Motion,
 }
 
@@ -96,18 +94,11 @@ impl Finder {
     }
 
     /// A frame begins: the views have moved from `before` to `frame.views`. Appends what must flip.
-    pub fn find(
-        &mut self,
-        frame: &Frame,
-        before: &[View],
-        roots: &[NodeId],
-        front: &Front,
-        flips: &mut Flips,
-    ) {
+    pub fn find(&mut self, frame: &Frame, before: &[View], front: &Front, flips: &mut Flips) {
         match self {
-            Self::TopDown(s) => s.find(frame, roots, front, flips),
+            Self::TopDown(s) => s.find(frame, front, flips),
             Self::Front(s) => s.find(frame, flips),
-            Self::Event(s) => s.find(frame, flips),
+            Self::Event(s) => s.find(frame, before, flips),
             Self::Published(s) => s.find(frame, before, front, flips),
         }
     }
@@ -118,8 +109,15 @@ impl Finder {
         match self {
             Self::TopDown(_) => {}
             Self::Front(s) => s.watch(node, kind, bounds),
-            Self::Event(s) => s.watch(frame, node, kind, bounds),
+            Self::Event(s) => s.watch(node, kind, bounds),
             Self::Published(s) => s.watch(frame, node, kind, &bounds),
+        }
+    }
+
+    /// The frame's changes have been made: whatever has come to be watched stays so.
+    pub fn settle(&mut self, frame: &Frame) {
+        if let Self::Event(s) = self {
+            s.settle(frame);
         }
     }
 

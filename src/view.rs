@@ -1,6 +1,6 @@
 //! The camera, and what selection needs of it.
 
-use glam::{DQuat, DVec3};
+use glam::{DMat3, DQuat, DVec3};
 
 /// A perspective camera: as recorded in a path, and as a renderer has it.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -16,6 +16,16 @@ pub struct Camera {
 }
 
 impl Camera {
+    /// A camera at `position` that looks at `target` with `up` upwards in the image, as far as that can be. `target`
+    /// must be elsewhere.
+    #[must_use]
+    pub fn look_at(position: DVec3, target: DVec3, up: DVec3, fov_y: f64, aspect: f64) -> Self {
+        let back = (position - target).normalize();
+        let right = up.cross(back).try_normalize().unwrap_or_else(|| back.any_orthonormal_vector());
+        let orientation = DQuat::from_mat3(&DMat3::from_cols(right, back.cross(right), back)).normalize();
+        Self { position, orientation, fov_y, aspect }
+    }
+
     /// Unit vector of the viewing direction.
     #[must_use]
     pub fn direction(&self) -> DVec3 {

@@ -13,11 +13,12 @@ use proptest::prelude::*;
 
 #[derive(Clone, Debug)]
 enum Operation {
-    Schedule { node: u32, frames: f64 },
+    Schedule { node: u32, clock: usize, frames: f64 },
     Press { node: u32 },
     Cancel { node: u32 },
-    Advance { frames: f64 },
+    Advance { clock: usize, frames: f64 },
     Rest,
+    TakeClock { clock: usize },
     TakeAll,
 }
 
@@ -26,17 +27,21 @@ fn operation() -> impl Strategy<Value = Operation> {
     let frames = prop_oneof![Just(0.0), 0.0..2.0, 0.0..100.0, 0.0..1e7, Just(1e30), Just(f64::INFINITY)];
     let motion = prop_oneof![Just(1e-300), 0.0..0.2, 0.0..3.0, 0.0..500.0, 0.0..1e6];
     prop_oneof![
-        6 => (node.clone(), frames).prop_map(|(node, frames)| Operation::Schedule { node, frames }),
+        6 => (node.clone(), 0..CLOCKS, frames)
+            .prop_map(|(node, clock, frames)| Operation::Schedule { node, clock, frames }),
         1 => node.clone().prop_map(|node| Operation::Press { node }),
         2 => node.prop_map(|node| Operation::Cancel { node }),
-        6 => motion.prop_map(|frames| Operation::Advance { frames }),
+        6 => (0..CLOCKS, motion).prop_map(|(clock, frames)| Operation::Advance { clock, frames }),
         1 => Just(Operation::Rest),
+        1 => (0..CLOCKS).prop_map(|clock| Operation::TakeClock { clock }),
         1 => Just(Operation::TakeAll),
     ]
 }
 
-/// The model: for each scheduled node, when it was scheduled and its deadline, or none if it presses.
-type Model = BTreeMap<u32, Option<(f64, f64)>>;
+/// The model: for each scheduled node, its clock, when it was scheduled and its deadline, or none if it presses.
+type Model = BTreeMap<u32, Option<(usize, f64, f64)>>;
+
+const CLOCKS: usize = 2;
 
 const BOUNDS: Bounds = Bounds { center: [0.0; 3], radius: 1.0, eps: 0.0 };
 
@@ -44,25 +49,26 @@ proptest! {
     #![proptest_config(ProptestConfig::with_cases(2000))]
 
     /// Every event comes up exactly once and never late; never much too early; a cancelled one never does; events
-    /// whose deadline lies in the tick that the clock is in come up at every advance.
+    /// whose deadline lies in the tick that their clock is in come up at every advance.
     #[test]
     fn queue_agrees_with_an_ordered_map(operations in prop::collection::vec(operation(), 1..200)) {
-        let mut queue = EventQueue::new(40);
+        let mut queue = EventQueue::new(40, CLOCKS);
         let mut model = Model::new();
-        let mut now = 0.0;
+        let mut now = [0.0; CLOCKS];
         for operation in operations {
             let mut due = Vec::new();
             match operation {
-                Operation::Schedule { node, frames } => {
+                Operation::Schedule { node, clock, frames } => {
                     if let Entry::Vacant(entry) = model.entry(node) {
-                        queue.schedule(now, frames, NodeId(node), Kind::Unfold, BOUNDS);
-                        entry.insert(Some((now, now + frames)));
+                        let event = queue.event(NodeId(node), Kind::Unfold, BOUNDS);
+                        queue.schedule(clock, now[clock], frames, event);
+                        entry.insert(Some((clock, now[clock], now[clock] + frames)));
                     }
                     continue;
                 }
                 Operation::Press { node } => {
                     if let Entry::Vacant(entry) = model.entry(node) {
-                        queue.press(NodeId(node), Kind::Unfold, BOUNDS);
+                        queue.press(queue.event(NodeId(node), Kind::Unfold, BOUNDS));
                         entry.insert(None);
                     }
                     continue;
@@ -72,13 +78,15 @@ proptest! {
                     queue.cancel(NodeId(node));
                     continue;
                 }
-                Operation::Advance { frames } => {
-                    now += frames;
-                    queue.advance(now, true, &mut due);
+                Operation::Advance { clock, frames } => {
+                    now[clock] += frames;
+                    let now = now[clock];
+                    queue.advance(clock, now, &mut due);
                     for event in &due {
                         let scheduled = model.remove(&event.node.0);
                         prop_assert!(scheduled.is_some(), "node {} came up unscheduled", event.node.0);
-                        if let Some(Some((since, deadline))) = scheduled {
+                        if let Some(Some((its_clock, since, deadline))) = scheduled {
+                            prop_assert_eq!(its_clock, clock);
                             // A slot is at most a quarter as wide as the time it was ahead; the horizon is finite.
                             let early = deadline - now;
                             prop_assert!(
@@ -88,15 +96,24 @@ proptest! {
                         }
                     }
                     for (node, scheduled) in &model {
-                        prop_assert!(scheduled.is_some_and(|(_, deadline)| deadline > now), "node {node} is late");
+                        let is_late = |(its_clock, _, deadline)| its_clock == clock && deadline <= now;
+                        prop_assert!(scheduled.is_some_and(|s| !is_late(s)), "node {node} is late");
                     }
                 }
                 Operation::Rest => {
-                    queue.advance(now, false, &mut due);
+                    queue.take_pressing(&mut due);
                     for event in &due {
                         prop_assert_eq!(model.remove(&event.node.0), Some(None));
                     }
                     prop_assert!(model.values().all(Option::is_some), "a pressing event did not come up");
+                }
+                Operation::TakeClock { clock } => {
+                    queue.take_clock(clock, &mut due);
+                    for event in &due {
+                        let scheduled = model.remove(&event.node.0).flatten();
+                        prop_assert!(scheduled.is_some_and(|(its_clock, ..)| its_clock == clock));
+                    }
+                    prop_assert!(!model.values().flatten().any(|&(its_clock, ..)| its_clock == clock));
                 }
                 Operation::TakeAll => {
                     queue.take_all(&mut due);

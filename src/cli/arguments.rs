@@ -7,6 +7,7 @@ use std::time::Duration;
 use clap::{Args, Parser, Subcommand, ValueEnum};
 
 use crate::criterion::Criterion;
+use crate::path::import;
 use crate::refine::Strategy;
 
 /// Event-driven view-dependent level of detail: build hierarchies, replay walkthroughs, compare strategies.
@@ -203,6 +204,16 @@ pub(super) enum ImportMode {
     Orbit,
 }
 
+impl From<ImportMode> for import::Mode {
+    fn from(mode: ImportMode) -> Self {
+        match mode {
+            ImportMode::Fly => Self::Fly,
+            ImportMode::Walk => Self::Walk,
+            ImportMode::Orbit => Self::Orbit,
+        }
+    }
+}
+
 /// One frame of a walkthrough of something.
 #[derive(Debug, Args)]
 pub(super) struct FrameOf {
@@ -275,9 +286,10 @@ fn positive(text: &str) -> Result<f64, String> {
 }
 
 fn strategy(text: &str) -> Result<Strategy, String> {
-    Strategy::ALL.into_iter().find(|s| s.name() == text).ok_or_else(|| {
-        format!("one of {} is expected", Strategy::ALL.map(Strategy::name).join(", "))
-    })
+    Strategy::ALL
+        .into_iter()
+        .find(|s| s.name() == text)
+        .ok_or_else(|| format!("one of {} is expected", Strategy::ALL.map(Strategy::name).join(", ")))
 }
 
 /// `A..B`, either of which may be missing.

@@ -59,7 +59,8 @@ impl Input {
 
     /// A short name for tables and file names.
     pub fn name(&self) -> String {
-        let stem = |path: &Path| path.file_stem().map_or_else(String::new, |s| s.to_string_lossy().into_owned());
+        let stem =
+            |path: &Path| path.file_stem().map_or_else(String::new, |s| s.to_string_lossy().into_owned());
         match self {
             Self::Scene(scene) => scene.to_string().trim_start_matches("scene:").to_owned(),
             Self::Log(path) => stem(path),
@@ -72,7 +73,7 @@ impl Input {
     pub fn mesh(&self) -> Result<Mesh> {
         let name = self.name();
         match self {
-            Self::Scene(scene) => Ok(stage(&format!("{name}: making the scene"), |p| scene.mesh(p))),
+            Self::Scene(scene) => stage(&format!("{name}: making the scene"), |p| Ok(scene.mesh(p))),
             Self::Log(path) => Ok(vertex_tree::read_log(path)?.mesh),
             Self::Meshes(paths) => Ok(stage(&format!("{name}: reading"), |p| mesh_io::read(paths, p))?),
         }
@@ -85,7 +86,8 @@ impl Input {
         }
         let mesh = self.mesh()?;
         let options = simplify::Options {
-            merge_components: merge_components || matches!(self, Self::Scene(scene) if scene.is_many_objects()),
+            merge_components: merge_components
+                || matches!(self, Self::Scene(scene) if scene.is_many_objects()),
         };
         let built = stage(&format!("{}: building the hierarchy", self.name()), |p| {
             simplify::build(mesh, &options, p)

@@ -160,7 +160,7 @@ impl Summary {
 ///
 /// # Errors
 /// If the file can not be written; nothing is left behind then.
-pub fn write_frames(file: &Path, runs: &[Run]) -> Result<(), WriteError> {
+pub fn write_frames(file: &Path, runs: &[&Run]) -> Result<(), WriteError> {
     write(file, &FRAMES, |out| {
         for run in runs {
             for row in &run.rows {
@@ -200,7 +200,7 @@ pub fn write_frames(file: &Path, runs: &[Run]) -> Result<(), WriteError> {
 ///
 /// # Errors
 /// If the file can not be written; nothing is left behind then.
-pub fn write_summary(file: &Path, runs: &[Run]) -> Result<(), WriteError> {
+pub fn write_summary(file: &Path, runs: &[&Run]) -> Result<(), WriteError> {
     write(file, &SUMMARY, |out| {
         for run in runs {
             let s = Summary::new(run);

@@ -98,7 +98,7 @@ pub enum MeshIoError {
         found: String,
     },
     /// A coordinate is infinite or not a number, or too large for 32 bits.
-    #[error("{}: {place}: coordinate {value} is not a finite 32-bit number", file.display())]
+    #[error("{}: {place}: coordinate {value:e} is not a finite 32-bit number", file.display())]
     NotFinite {
         /// The file.
         file: PathBuf,

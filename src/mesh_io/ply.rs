@@ -14,7 +14,7 @@ use serde_ply::{DeserializeError, PlyFormat, PlyReader, RowVisitor};
 use super::input::Input;
 use super::polygon::Faces;
 use super::{MeshIoError, Place};
-use crate::Mesh;
+use crate::{Mesh, output};
 
 #[derive(Deserialize)]
 struct Vertex {
@@ -83,12 +83,13 @@ impl Contents {
     fn read_from(&mut self, reader: impl BufRead) -> Result<PlyFormat, DeserializeError> {
         let mut reader = PlyReader::from_reader(reader)?;
         let format = reader.header().format;
+        let mut elements = reader.header().elem_defs.iter();
+        if let Some(element) = elements.find(|e| e.properties.is_empty() && e.count > 0) {
+            // Its rows would take no bytes, and reading them all could take forever.
+            let message = format!("element {} has no properties", element.name);
+            return Err(io::Error::new(io::ErrorKind::InvalidData, message).into());
+        }
         while let Some(element) = reader.current_element() {
-            if element.properties.is_empty() && element.count > 0 {
-                // Its rows would take no bytes, and reading them all could take forever.
-                let message = format!("element {} has no properties", element.name);
-                return Err(io::Error::new(io::ErrorKind::InvalidData, message).into());
-            }
             match element.name.as_str() {
                 "vertex" => {
                     self.place = Some(Place::Vertex(0));
@@ -141,15 +142,7 @@ pub fn write_ply(path: &Path, mesh: &Mesh, colours: Option<&[[u8; 3]]>) -> Resul
         return Err(MeshIoError::ColourCount { file: path.to_owned(), colours, vertices });
     }
     let io = |source| MeshIoError::Io { file: path.to_owned(), source };
-    let folder = match path.parent() {
-        Some(p) if !p.as_os_str().is_empty() => p,
-        _ => Path::new("."),
-    };
-    let mut temporary = tempfile::Builder::new().prefix(".foldfront-").tempfile_in(folder).map_err(io)?;
-    write_to(temporary.as_file_mut(), mesh, colours).map_err(io)?;
-    temporary.as_file().sync_all().map_err(io)?;
-    temporary.persist(path).map_err(|e| io(e.error))?;
-    Ok(())
+    output::write_with(path, |file| write_to(file, mesh, colours)).map_err(io)
 }
 
 fn write_to(file: &mut File, mesh: &Mesh, colours: Option<&[[u8; 3]]>) -> io::Result<()> {

@@ -3,7 +3,7 @@
 //! A polygon is projected on its Newell plane (the normal is the sum of the cross products of consecutive corners,
 //! Sutherland, Sproull & Schumacker 1974). If the fan around its first corner turns the right way everywhere, as in
 //! every strictly convex polygon, it is taken; otherwise ears are clipped (the `earcut` crate). Every edge of a
-//! polygon becomes the edge of a triangle, so that neighbouring polygons still meet without a gap.
+//! polygon becomes the edge of one triangle, so that neighbouring polygons still meet without a gap.
 
 use std::path::Path;
 
@@ -79,7 +79,6 @@ struct Triangulator {
     ring: Vec<[f64; 3]>,
     plane: Vec<[f64; 2]>,
     ears: Vec<u32>,
-    clipped: Vec<bool>,
 }
 
 impl Triangulator {
@@ -104,7 +103,8 @@ impl Triangulator {
                 push([ear[0] as usize, ear[1] as usize, ear[2] as usize]);
             }
         } else {
-            // A polygon without area or one that crosses itself has no right triangulation; the fan keeps its edges.
+            // The fan is right, or else the polygon has no area or crosses itself: then nothing is right, and the
+            // fan at least keeps its edges.
             for i in 1..corners.len() - 1 {
                 push([0, i, i + 1]);
             }
@@ -116,58 +116,10 @@ impl Triangulator {
         (1..self.plane.len() - 1).all(|i| signed_area(self.plane[0], self.plane[i], self.plane[i + 1]) > 0.0)
     }
 
-    /// Fills `ears` with counter-clockwise triangles; false if they can not be made to cover every corner.
+    /// Fills `ears` with triangles that turn as the polygon does; false if they do not use every corner.
     fn clip_ears(&mut self) -> bool {
-        self.earcut.earcut(self.plane.iter().copied(), &[], &mut self.ears);
-        for ear in self.ears.chunks_exact_mut(3) {
-            let [a, b, c] = [ear[0], ear[1], ear[2]].map(|i| self.plane[i as usize]);
-            if signed_area(a, b, c) < 0.0 {
-                ear.swap(1, 2);
-            }
-        }
-        self.restore_corners();
+        self.earcut.earcut_slice(&self.plane, &[], &mut self.ears);
         self.ears.len() == 3 * (self.plane.len() - 2)
-    }
-
-    /// Puts back the corners that ear clipping left out because they lie on the line between their neighbours:
-    /// the triangle at the edge from p to q that a run of such corners d e lies on becomes a fan.
-    ///
-    /// ```text
-    ///      c              c
-    ///     / \            /|\
-    ///    /   \    =>    / | \      (shown with one corner d)
-    ///   p-----q        p--d--q
-    /// ```
-    fn restore_corners(&mut self) {
-        let count = self.plane.len();
-        self.clipped.clear();
-        self.clipped.resize(count, true);
-        for &corner in &self.ears {
-            self.clipped[corner as usize] = false;
-        }
-        for before in 0..count {
-            if self.clipped[before] || !self.clipped[(before + 1) % count] {
-                continue;
-            }
-            let run = (1..count).take_while(|i| self.clipped[(before + i) % count]).count();
-            let (p, q) = (before as u32, ((before + run + 1) % count) as u32);
-            let Some(at) = (0..self.ears.len()).find(|&i| {
-                let next = if i % 3 == 2 { i - 2 } else { i + 1 };
-                (self.ears[i], self.ears[next]) == (p, q)
-            }) else {
-                return;
-            };
-            let opposite = self.ears[at / 3 * 3 + (at + 2) % 3];
-            for step in 0..=run {
-                let edge = [before + step, before + step + 1].map(|i| (i % count) as u32);
-                let triangle = [edge[0], edge[1], opposite];
-                if step == 0 {
-                    self.ears[at / 3 * 3..][..3].copy_from_slice(&triangle);
-                } else {
-                    self.ears.extend(triangle);
-                }
-            }
-        }
     }
 }
 
@@ -223,8 +175,8 @@ mod tests {
         }
     }
 
-    /// An L with further corners on three of its edges: ear clipping alone would drop these, and a neighbour that
-    /// uses them would be left with a gap.
+    /// An L with further corners on three of its edges: were they dropped, a neighbour that uses them would be left
+    /// with a gap.
     #[test]
     fn corners_on_a_straight_edge_are_kept() {
         let mut l: Vec<[f32; 2]> = vec![

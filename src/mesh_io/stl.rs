@@ -26,9 +26,9 @@ pub(super) fn read(mut input: Input<'_>) -> Result<Mesh, MeshIoError> {
         && !start.contains(&0);
     let mut weld = Weld::default();
     if text {
-        read_text(&mut input, &mut weld)?
+        read_text(&mut input, &mut weld)?;
     } else {
-        read_binary(&mut input, &mut weld)?
+        read_binary(&mut input, &mut weld)?;
     }
     Ok(weld.mesh)
 }

@@ -45,11 +45,16 @@ impl<'i, 'a> Lines<'i, 'a> {
             let text =
                 self.comment.map_or(&*text, |mark| text.split(mark).next().unwrap_or("")).trim_ascii_end();
             let joined = text.strip_suffix('\\').filter(|_| self.continued);
-            self.text.push_str(joined.unwrap_or(text));
-            if read == 0 || (joined.is_none() && !self.text.trim_ascii().is_empty()) {
+            if let Some(start) = joined {
+                self.text.push_str(start);
+                self.text.push(' ');
+                continue;
+            }
+            self.text.push_str(text);
+            if read == 0 || !self.text.trim_ascii().is_empty() {
                 break;
             }
-            self.text.push(' ');
+            self.text.clear();
         }
         let line = Line { file: self.input.path, number: self.number, rest: self.text.trim_ascii() };
         Ok(if line.is_empty() { None } else { Some(line) })

@@ -1,49 +1,131 @@
 //! Event-driven refinement: a node is tested only when the camera could have changed the answer.
 //!
-//! After Zach & Karner (2003), with time bounds that never miss (see [`criterion`](crate::criterion)) on a clock
-//! that runs on distance travelled (see [`motion`](crate::motion)): exact at any speed of the camera.
+//! After Zach & Karner (2003), with time bounds that never miss (see [`criterion`](crate::criterion)) on clocks
+//! that run on distance travelled (see [`motion`](crate::motion)): exact at any speed of the camera.
+//!
+//! # Several clocks
+//!
+//! A clock advances by the larger of distance travelled over `rho` and angle turned over `omega`, so it is wasteful
+//! for a camera that turns without moving as fast as declared, or moves without turning. Here several clocks differ in
+//! the ratio of the two: clock `i` takes one of the declared speeds down by a power of two. All of them always run; an
+//! event waits on the one that fit the motion of the frame in which it was scheduled. Each by itself never misses, so
+//! the choice is free.
 
+use multiversion::multiversion;
 use vertex_tree::{Bounds, NodeId};
 
 use super::{Flips, Frame};
-use crate::motion::Motion;
+use crate::filter::{Lens, Lenses, earliest};
+use crate::motion::{Motion, Odometer, Speed, Travel};
+use crate::packed::{Block, LANES};
 use crate::queue::{Event, EventQueue, Kind};
+use crate::view::View;
+
+/// Clocks with `omega` taken down, and as many with `rho` taken down.
+const SKEWED: i32 = 4;
+const CLOCKS: usize = 2 * SKEWED as usize + 1;
 
 pub(crate) struct EventDriven {
     queue: EventQueue,
+    odometers: [Odometer; CLOCKS],
+    /// The clock for new events.
+    clock: usize,
+    /// Nodes watched since the last frame's events were scheduled.
+    fresh: Vec<Event>,
     /// Kept between frames for its allocation.
     due: Vec<Event>,
 }
 
+/// Declared speeds of a clock.
+fn skew(speed: &Speed, clock: usize) -> Speed {
+    let skew = clock as i32 - SKEWED;
+    let share = f64::from(1_u32 << skew.unsigned_abs()).recip();
+    if skew < 0 {
+        Speed { omega: speed.omega * share, ..*speed }
+    } else {
+        Speed { rho: speed.rho * share, ..*speed }
+    }
+}
+
 impl EventDriven {
     pub fn new(node_limit: u32) -> Self {
-        Self { queue: EventQueue::new(node_limit), due: Vec::new() }
+        Self {
+            queue: EventQueue::new(node_limit, CLOCKS),
+            odometers: [Odometer::default(); CLOCKS],
+            clock: SKEWED as usize,
+            fresh: Vec::new(),
+            due: Vec::new(),
+        }
     }
 
-    pub fn find(&mut self, frame: &Frame, flips: &mut Flips) {
+    pub fn find(&mut self, frame: &Frame, before: &[View], flips: &mut Flips) {
+        // Nodes may have come to be watched outside of a frame: the roots.
+        self.settle(frame);
         self.due.clear();
         match frame.motion {
-            Motion::Rest => self.queue.advance(frame.now, false, &mut self.due),
-            Motion::Frames(_) => self.queue.advance(frame.now, true, &mut self.due),
+            Motion::Rest => self.queue.take_pressing(&mut self.due),
+            Motion::Frames(_) => self.advance(frame, before),
             Motion::Unbounded => self.queue.take_all(&mut self.due),
         }
+        if self.due.is_empty() {
+            return;
+        }
         flips.tests += self.due.len() as u64;
-        for &event in &self.due {
-            let frames = bound(frame, event.kind, &event.bounds);
-            // A positive bound says that nothing can have changed yet; only then is the predicate spared.
-            if frames == 0.0 && frame.unfold(&event.bounds) == (event.kind == Kind::Unfold) {
-                match event.kind {
-                    Kind::Unfold => flips.unfold.push(event.node),
-                    Kind::Fold => flips.fold.push(event.node),
+        let due = std::mem::take(&mut self.due);
+        self.process(&due, frame, |event, _| match event.kind() {
+            Kind::Unfold => flips.unfold.push(event.node),
+            Kind::Fold => flips.fold.push(event.node),
+        });
+        self.due = due;
+    }
+
+    /// Moves all clocks, and chooses the one that the motion fits.
+    fn advance(&mut self, frame: &Frame, before: &[View]) {
+        let Some(travel) = Travel::between(before, frame.views) else {
+            return self.queue.take_all(&mut self.due);
+        };
+        let mut least = f64::INFINITY;
+        for clock in 0..CLOCKS {
+            let speed = skew(&frame.speed, clock);
+            match self.odometers[clock].advance_by(&speed, &travel) {
+                Motion::Frames(frames) => {
+                    self.queue.advance(clock, self.odometers[clock].now(), &mut self.due);
+                    // What the clock allows for in the time that it takes this motion for, at a typical distance.
+                    let share = speed.rho / frame.speed.rho + speed.omega / frame.speed.omega;
+                    if frames * share < least {
+                        least = frames * share;
+                        self.clock = clock;
+                    }
                 }
-            } else {
-                self.queue.reschedule(frame.now, frames, event);
+                Motion::Rest => {}
+                Motion::Unbounded => self.queue.take_clock(clock, &mut self.due),
             }
         }
     }
 
-    pub fn watch(&mut self, frame: &Frame, node: NodeId, kind: Kind, bounds: Bounds) {
-        self.queue.schedule(frame.now, bound(frame, kind, &bounds), node, kind, bounds);
+    /// Schedules the nodes that have come to be watched in this frame.
+    pub fn settle(&mut self, frame: &Frame) {
+        let mut fresh = std::mem::take(&mut self.fresh);
+        fresh.retain(|event| self.queue.is_valid(event));
+        let (clock, now) = (self.clock, self.odometers[self.clock].now());
+        // A node that no view wants is active where another needs it: its time to fold is the next motion.
+        self.process(&fresh, frame, |event, queue| queue.schedule(clock, now, 0.0, *event));
+        fresh.clear();
+        self.fresh = fresh;
+    }
+
+    /// Tests events, calls `flip` for those whose nodes should change and schedules the others.
+    fn process(&mut self, due: &[Event], frame: &Frame, flip: impl FnMut(&Event, &mut EventQueue)) {
+        let (clock, now) = (self.clock, self.odometers[self.clock].now());
+        let bench = Bench { frame, speed: skew(&frame.speed, clock), clock, now };
+        match Lenses::new(frame.criterion, frame.views) {
+            Some(lenses) => process(due, lenses.as_slice(), &bench, &mut self.queue, flip),
+            None => process_plainly(due, &bench, &mut self.queue, flip),
+        }
+    }
+
+    pub fn watch(&mut self, node: NodeId, kind: Kind, bounds: Bounds) {
+        self.fresh.push(self.queue.event(node, kind, bounds));
     }
 
     pub fn unwatch(&mut self, node: NodeId) {
@@ -51,15 +133,71 @@ impl EventDriven {
     }
 
     pub fn refused(&mut self, node: NodeId, kind: Kind, bounds: Bounds) {
-        self.queue.press(node, kind, bounds);
+        self.queue.press(self.queue.event(node, kind, bounds));
     }
 }
 
-/// Frames at full speed before the node can have to change.
-#[inline]
-fn bound(frame: &Frame, kind: Kind, bounds: &Bounds) -> f64 {
-    match kind {
-        Kind::Unfold => frame.criterion.earliest_unfold(frame.views, &frame.speed, bounds),
-        Kind::Fold => frame.criterion.earliest_fold(frame.views, &frame.speed, bounds),
+/// What an event is tested with, and where it waits after that.
+struct Bench<'a> {
+    frame: &'a Frame<'a>,
+    /// Of the clock.
+    speed: Speed,
+    clock: usize,
+    now: f64,
+}
+
+#[multiversion(targets("x86_64+avx2", "x86_64+sse4.1"))]
+fn process(
+    due: &[Event],
+    lenses: &[Lens],
+    bench: &Bench,
+    queue: &mut EventQueue,
+    mut flip: impl FnMut(&Event, &mut EventQueue),
+) {
+    let mut block = Block::EMPTY;
+    for events in due.chunks(LANES) {
+        for (lane, event) in events.iter().enumerate() {
+            block.set(lane, &event.bounds, u32::from(event.kind() == Kind::Fold));
+        }
+        let frames = earliest(&block, lenses, &bench.speed);
+        for (event, &frames) in events.iter().zip(&frames) {
+            if frames > 0.0 {
+                queue.schedule(bench.clock, bench.now, f64::from(frames), *event);
+            } else {
+                test(event, bench, queue, &mut flip);
+            }
+        }
+    }
+}
+
+/// Without the filter, for more views than it takes.
+fn process_plainly(
+    due: &[Event],
+    bench: &Bench,
+    queue: &mut EventQueue,
+    mut flip: impl FnMut(&Event, &mut EventQueue),
+) {
+    for event in due {
+        test(event, bench, queue, &mut flip);
+    }
+}
+
+/// Tests one event in f64.
+fn test(
+    event: &Event,
+    bench: &Bench,
+    queue: &mut EventQueue,
+    flip: &mut impl FnMut(&Event, &mut EventQueue),
+) {
+    let Bench { frame, speed, clock, now } = bench;
+    let frames = match event.kind() {
+        Kind::Unfold => frame.criterion.earliest_unfold(frame.views, speed, &event.bounds),
+        Kind::Fold => frame.criterion.earliest_fold(frame.views, speed, &event.bounds),
+    };
+    // A positive bound says that nothing can have changed yet; only then is the predicate spared.
+    if frames == 0.0 && frame.unfold(&event.bounds) == (event.kind() == Kind::Unfold) {
+        flip(event, queue);
+    } else {
+        queue.schedule(*clock, *now, frames, *event);
     }
 }

@@ -1,63 +1,73 @@
-//! Front scan: every boundary and every collapsible node is tested, every frame, in a packed array.
+//! Front scan: every boundary and every collapsible node is tested, every frame, in packed arrays.
 //!
-//! What systems that keep an explicit list of front vertices do (Hoppe 1997; El-Sana & Varshney 1999). Half of the
-//! nodes that top-down visits lie above the front and need no test.
+//! What systems that keep an explicit list of front vertices do (Hoppe 1997; El-Sana & Varshney 1999), with vector
+//! instructions. Half of the nodes that top-down visits lie above the front and need no test.
 
+use multiversion::multiversion;
 use vertex_tree::{Bounds, NodeId};
 
 use super::{Flips, Frame};
+use crate::filter::{Lens, Lenses, certainly, doubtful, for_each_bit};
+use crate::packed::Packed;
 use crate::queue::Kind;
 
-#[derive(Clone, Copy)]
-struct Entry {
-    bounds: Bounds,
-    node: NodeId,
-    kind: Kind,
-}
-
 pub(crate) struct FrontScan {
-    entries: Vec<Entry>,
-    /// For each node, the place of its entry plus 1, or 0.
+    /// Boundary nodes, and collapsible nodes.
+    folded: Packed,
+    unfolded: Packed,
+    /// For each node, twice the place of its entry in one of the two, plus 1 in the second, plus 2; or 0.
     place: Vec<u32>,
 }
 
 impl FrontScan {
     pub fn new(node_limit: u32) -> Self {
-        Self { entries: Vec::new(), place: vec![0; node_limit as usize] }
+        Self { folded: Packed::default(), unfolded: Packed::default(), place: vec![0; node_limit as usize] }
     }
 
     pub fn find(&self, frame: &Frame, flips: &mut Flips) {
-        flips.tests += self.entries.len() as u64;
-        match frame.views {
-            [view] => self.scan(flips, |bounds| frame.criterion.unfold_for(view, bounds)),
-            _ => self.scan(flips, |bounds| frame.unfold(bounds)),
-        }
-    }
-
-    #[inline(always)]
-    fn scan(&self, flips: &mut Flips, unfold: impl Fn(&Bounds) -> bool) {
-        for entry in &self.entries {
-            if unfold(&entry.bounds) == (entry.kind == Kind::Unfold) {
-                match entry.kind {
-                    Kind::Unfold => flips.unfold.push(entry.node),
-                    Kind::Fold => flips.fold.push(entry.node),
-                }
-            }
-        }
+        flips.tests += (self.folded.len() + self.unfolded.len()) as u64;
+        let lenses = Lenses::new(frame.criterion, frame.views);
+        scan(&self.folded, Kind::Unfold, lenses.as_ref().map(Lenses::as_slice), frame, &mut flips.unfold);
+        scan(&self.unfolded, Kind::Fold, lenses.as_ref().map(Lenses::as_slice), frame, &mut flips.fold);
     }
 
     pub fn watch(&mut self, node: NodeId, kind: Kind, bounds: Bounds) {
         if self.place[node.index()] == 0 {
-            self.entries.push(Entry { bounds, node, kind });
-            self.place[node.index()] = self.entries.len() as u32;
+            let packed = self.packed(kind == Kind::Fold);
+            packed.push(&bounds, node.0);
+            let at = packed.len() as u32 - 1;
+            self.place[node.index()] = 2 * at + u32::from(kind == Kind::Fold) + 2;
         }
     }
 
     pub fn unwatch(&mut self, node: NodeId) {
-        let Some(at) = std::mem::take(&mut self.place[node.index()]).checked_sub(1) else { return };
-        self.entries.swap_remove(at as usize);
-        if let Some(moved) = self.entries.get(at as usize) {
-            self.place[moved.node.index()] = at + 1;
+        let Some(place) = std::mem::take(&mut self.place[node.index()]).checked_sub(2) else { return };
+        if let Some(moved) = self.packed(place % 2 == 1).swap_remove(place as usize / 2) {
+            self.place[moved as usize] = place + 2;
         }
+    }
+
+    fn packed(&mut self, unfolded: bool) -> &mut Packed {
+        if unfolded { &mut self.unfolded } else { &mut self.folded }
+    }
+}
+
+/// Appends the nodes among `packed` that must flip. Without lenses the filter is passed over.
+#[multiversion(targets("x86_64+avx2", "x86_64+sse4.1"))]
+fn scan(packed: &Packed, kind: Kind, lenses: Option<&[Lens]>, frame: &Frame, flips: &mut Vec<NodeId>) {
+    for (block, used) in packed.blocks() {
+        let mask = match lenses {
+            // A boundary node flips unless it is certainly not wanted, a collapsible one unless it certainly is.
+            Some(lenses) => match kind {
+                Kind::Unfold => doubtful(&certainly::<false>(block, lenses), used),
+                Kind::Fold => doubtful(&certainly::<true>(block, lenses), used),
+            },
+            None => (1 << used) - 1,
+        };
+        for_each_bit(mask, |lane| {
+            if frame.unfold(&block.bounds(lane)) == (kind == Kind::Unfold) {
+                flips.push(NodeId(block.tag[lane]));
+            }
+        });
     }
 }

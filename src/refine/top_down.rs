@@ -1,55 +1,54 @@
 //! Top-down traversal (Zach & Karner 2003, Figure 3): every node in play is tested, every frame.
 //!
-//! The paper's recursion, with a stack that holds at most one node a level. Records lie in depth-first order, so the
-//! walk reads memory in sequence.
-
-use vertex_tree::NodeId;
+//! The paper recurses. Here the hierarchy is walked level by level: the nodes of a level are known before the first
+//! of them is read, so that the processor fetches several at once instead of waiting for each in turn. Siblings are
+//! visited together, as their records share a cache line.
 
 use super::{Flips, Frame};
 use crate::front::Front;
+use vertex_tree::{Bounds, NONE};
 
 #[derive(Default)]
 pub(crate) struct TopDown {
-    stack: Vec<NodeId>,
+    /// Pairs of siblings to visit, by level. Kept between frames for their allocations.
+    level: Vec<u32>,
+    below: Vec<u32>,
 }
 
 impl TopDown {
-    pub fn find(&mut self, frame: &Frame, roots: &[NodeId], front: &Front, flips: &mut Flips) {
+    pub fn find(&mut self, frame: &Frame, front: &Front, flips: &mut Flips) {
         // One view is the rule, and worth a loop without a loop in it.
         match frame.views {
-            [view] => self.walk(roots, front, flips, |bounds| frame.criterion.unfold_for(view, bounds)),
-            _ => self.walk(roots, front, flips, |bounds| frame.unfold(bounds)),
+            [view] => self.walk(front, flips, |bounds| frame.criterion.unfold_for(view, bounds)),
+            _ => self.walk(front, flips, |bounds| frame.unfold(bounds)),
         }
     }
 
     #[inline(always)]
-    fn walk(
-        &mut self,
-        roots: &[NodeId],
-        front: &Front,
-        flips: &mut Flips,
-        unfold: impl Fn(&vertex_tree::Bounds) -> bool,
-    ) {
-        for &root in roots {
-            self.stack.push(root);
-            while let Some(mut node) = self.stack.pop() {
-                loop {
-                    let visit = front.visit(node);
+    fn walk(&mut self, front: &Front, flips: &mut Flips, unfold: impl Fn(&Bounds) -> bool) {
+        self.level.clear();
+        self.level.extend_from_slice(front.root_pairs());
+        while !self.level.is_empty() {
+            self.below.clear();
+            for &pair in &self.level {
+                for record in front.pair(pair) {
+                    if record.node.0 == NONE {
+                        continue;
+                    }
                     flips.tests += 1;
-                    let wanted = unfold(&visit.bounds);
-                    if wanted != visit.active {
+                    front.descend(record, &mut self.below);
+                    let (wanted, active) = (unfold(&record.bounds), record.is_active());
+                    if wanted != active {
                         if wanted {
-                            flips.unfold.push(node);
-                        } else if front.is_collapsible(node) {
+                            flips.unfold.push(record.node);
+                        } else if record.is_collapsible() {
                             // The rest of a subtree that has to go follows from its lowest nodes upwards.
-                            flips.fold.push(node);
+                            flips.fold.push(record.node);
                         }
                     }
-                    self.stack.extend(visit.next_sibling);
-                    let Some(child) = visit.first_child else { break };
-                    node = child;
                 }
             }
+            std::mem::swap(&mut self.level, &mut self.below);
         }
     }
 }

@@ -1,5 +1,9 @@
-//! What several test files share: a generator of random logs and views.
+//! What several test files share: the table of backends, real data, a generator of random logs and views.
 #![allow(dead_code)]
+
+pub mod backends;
+pub mod data;
+pub mod sink;
 
 use foldfront::view::View;
 use foldfront::{Bounds, Collapse, CollapseLog, Mesh};

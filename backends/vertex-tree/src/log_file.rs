@@ -117,7 +117,11 @@ pub fn write_log(path: &Path, log: &CollapseLog) -> Result<(), LogFileError> {
         Some(p) if !p.as_os_str().is_empty() => p,
         _ => Path::new("."),
     };
-    let mut temporary = tempfile::Builder::new().prefix(".foldfront-").tempfile_in(folder).map_err(io)?;
+    let mut builder = tempfile::Builder::new();
+    // Temporary files are for their owner alone; what is made here is a file like any other.
+    #[cfg(unix)]
+    builder.permissions(std::os::unix::fs::PermissionsExt::from_mode(0o666));
+    let mut temporary = builder.prefix(".foldfront-").tempfile_in(folder).map_err(io)?;
     {
         let mut out = BufWriter::with_capacity(1 << 20, temporary.as_file_mut());
         write_to(&mut out, log).and_then(|()| out.flush()).map_err(io)?;
@@ -210,7 +214,10 @@ pub fn read_log(path: &Path) -> Result<CollapseLog, LogFileError> {
     }
     let (vertices, triangles, collapses) = (long(16), long(24), long(32));
     let most = u64::from(u32::MAX) - 1;
-    for (offset, count, limit) in [(16, vertices, most), (24, triangles, most), (32, collapses, vertices)] {
+    let most_collapses = vertices.saturating_sub(1);
+    for (offset, count, limit) in
+        [(16, vertices, most), (24, triangles, most), (32, collapses, most_collapses)]
+    {
         if count > limit {
             return Err(LogFileError::Count { file: path.to_owned(), offset, count });
         }

@@ -88,8 +88,9 @@ pub enum TreeError {
 /// # Residency
 ///
 /// [`children`](Self::children), [`parents`](Self::parents) and [`bounds`](Self::bounds) are asked only of roots,
-/// of boundary and active nodes, and of the children of a node that has just been unfolded. The engine keeps
-/// what it needs of the rest, so a backend may drop the pages of active nodes that are not collapsible.
+/// of boundary and active nodes, of the children of active nodes, and of nodes that [`Step::Needs`] has named and what
+/// is above those. The engine keeps what it needs of the rest, so a backend may drop the pages of active nodes that are
+/// not collapsible.
 pub trait VertexTree {
     /// One more than the largest node number.
     fn node_limit(&self) -> u32;

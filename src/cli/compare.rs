@@ -1,0 +1,162 @@
+//! `compare`: the main job.
+
+use std::path::Path as FilePath;
+
+use anyhow::{Context, Result, bail};
+use vertex_tree::CollapseLog;
+
+use super::arguments::Compare;
+use super::input::Input;
+use super::print;
+use super::progress::stage;
+use crate::budget::Budget;
+use crate::compare::{Options, Run, Subject, csv};
+use crate::path::{self, Path};
+use crate::refine::Strategy;
+use crate::render::{self, Image, Style};
+use crate::report::{Picture, Report, Section};
+use crate::scene::{Scene, SceneKind};
+use crate::{output, simplify};
+
+pub(super) fn compare(command: &Compare) -> Result<()> {
+    let inputs = if command.input.is_empty() {
+        SceneKind::ALL.map(|kind| Input::Scene(Scene::new(kind))).to_vec()
+    } else {
+        Input::all(&command.input)?
+    };
+    let paths: Vec<Path> = command.path.iter().map(|file| Path::read(file)).collect::<Result<_, _>>()?;
+    let options = options(command);
+    // Before the work, not after it.
+    super::check_folder(&command.out)?;
+
+    let arguments: Vec<String> = std::env::args().skip(1).collect();
+    let mut report = Report { command: format!("foldfront {}", arguments.join(" ")), sections: Vec::new() };
+    for (input, name) in inputs.iter().zip(unique_names(&inputs)) {
+        report.sections.push(section(command, input, name, &paths, &options)?);
+    }
+    let file = command.out.join("report.html");
+    let mut pages = vec![(file.clone(), report.to_html()?)];
+    for section in &report.sections {
+        pages.push((command.out.join(format!("selection-{}.svg", section.name)), section.curves()?));
+    }
+    // Only now, so that a failure leaves what is there as it is.
+    std::fs::create_dir_all(&command.out).with_context(|| command.out.display().to_string())?;
+    let runs: Vec<&Run> = report.sections.iter().flat_map(|section| &section.runs).collect();
+    csv::write_frames(&command.out.join("frames.csv"), &runs)?;
+    csv::write_summary(&command.out.join("summary.csv"), &runs)?;
+    for (file, text) in &pages {
+        write(file, text)?;
+    }
+    print(&format!("{}\nThe report is in {}\n", report.to_text(), file.display()))
+}
+
+/// Everything about one input.
+fn section(
+    command: &Compare,
+    input: &Input,
+    name: String,
+    paths: &[Path],
+    options: &Options,
+) -> Result<Section> {
+    let (log, built) = input.log(false)?;
+    let walks = match (paths, input) {
+        ([], Input::Scene(scene)) => path::recorded(scene.kind())?.to_vec(),
+        ([], _) => vec![path::around(&log.mesh)],
+        (paths, _) => paths.to_vec(),
+    };
+    let mut subject = Subject::new(&name, &log)?;
+    let mut runs = Vec::new();
+    let mut pictures = Vec::new();
+    for walk in &walks {
+        let frames = command.frames.clone().unwrap_or(0..usize::MAX);
+        let frames = frames.start..frames.end.min(walk.frames.len());
+        if frames.is_empty() {
+            bail!("path {} has frames 0 to {} only", walk.name, walk.frames.len() - 1);
+        }
+        let label = format!("{name}: {}, {} frames", walk.name, frames.len());
+        let replayed = stage(&label, |p| subject.replay(walk, frames, options, p))?;
+        let frame = most_complex(&replayed[0]);
+        pictures.extend(stage(&format!("{name}: pictures"), |_| draw(&subject, walk, frame, options))?);
+        runs.extend(replayed);
+    }
+    Ok(Section { name, facts: facts(&log, built.as_ref()), runs, pictures })
+}
+
+/// The frame with the most active nodes: the one that shows most.
+fn most_complex(run: &Run) -> usize {
+    run.rows.iter().max_by_key(|row| row.report.active_nodes).map_or(0, |row| row.frame)
+}
+
+/// A frame from the camera and from outside.
+fn draw(subject: &Subject, walk: &Path, frame: usize, options: &Options) -> Result<[Picture; 2]> {
+    let engine = subject.frame(walk, frame, options)?;
+    let mesh = engine.mesh().to_mesh();
+    let camera = walk.camera(frame);
+    let style = Style { width: 960, ..Style::default() };
+    let picture = |what: &str, image: Image| -> Result<Picture> {
+        let caption =
+            format!("{}, frame {frame}, {what}: {} triangles displayed.", walk.name, mesh.triangles.len());
+        Ok(Picture { caption, png: image.png_bytes()? })
+    };
+    Ok([
+        picture("as the camera sees it", render::render(&mesh, &camera, &style))?,
+        picture("from outside, with the frustum", render::render_outside(&mesh, &camera, &style))?,
+    ])
+}
+
+fn facts(log: &CollapseLog, built: Option<&simplify::Report>) -> Vec<(&'static str, String)> {
+    let mut facts = vec![
+        ("triangles", log.mesh.triangles.len().to_string()),
+        ("vertices", log.mesh.positions.len().to_string()),
+        ("collapses", log.collapses.len().to_string()),
+        ("extent", format!("{:.4}", log.mesh.extent())),
+    ];
+    if let Some(built) = built {
+        let time = (built.preparation + built.simplification + built.conclusion).as_secs_f64();
+        let per_triangle = time * 1e6 / built.triangles.max(1) as f64;
+        facts.push(("roots", built.roots.to_string()));
+        facts.push(("depth", built.tree_depth.to_string()));
+        facts.push(("construction", format!("{time:.2} s, {per_triangle:.2} µs a triangle")));
+    }
+    facts
+}
+
+/// A name for each input that no other has, fit for a file name.
+fn unique_names(inputs: &[Input]) -> Vec<String> {
+    let mut names: Vec<String> = Vec::new();
+    for input in inputs {
+        let plain = |c: char| if c.is_alphanumeric() || "-_.+@".contains(c) { c } else { '-' };
+        let name: String = input.name().chars().map(plain).collect();
+        let mut unique = name.clone();
+        let mut number = 2;
+        while names.contains(&unique) {
+            unique = format!("{name}-{number}");
+            number += 1;
+        }
+        names.push(unique);
+    }
+    names
+}
+
+fn write(file: &FilePath, text: &str) -> Result<()> {
+    output::write(file, text.as_bytes()).with_context(|| file.display().to_string())
+}
+
+fn options(command: &Compare) -> Options {
+    let budget = match (command.triangles, command.frame_time) {
+        (Some(most), _) => Budget::Triangles(most),
+        (None, Some(most)) => Budget::FrameTime(most),
+        (None, None) => Budget::None,
+    };
+    let strategies =
+        if command.strategy.is_empty() { Strategy::ALL.to_vec() } else { command.strategy.clone() };
+    Options {
+        strategies,
+        criterion: command.refinement.criterion.into(),
+        theta: command.refinement.theta(),
+        budget,
+        rho: command.rho,
+        omega: command.omega,
+        check: command.check,
+    }
+}

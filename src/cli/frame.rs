@@ -1,0 +1,97 @@
+//! `export`, `render` and `deviation`: one frame of anything.
+
+use std::fmt::Write;
+
+use anyhow::{Result, bail};
+use vertex_tree::Mesh;
+
+use super::arguments::{Deviation, Export, LINES, Refinement, Render};
+use super::input::Input;
+use super::print;
+use super::progress::stage;
+use crate::budget::Budget;
+use crate::compare::{Options, Subject};
+use crate::deviation::Reference;
+use crate::path::Path;
+use crate::refine::Strategy;
+use crate::render::{self, Style};
+use crate::view::Camera;
+
+fn options(refinement: &Refinement) -> Options {
+    Options {
+        strategies: vec![Strategy::TopDown],
+        criterion: refinement.criterion.into(),
+        theta: refinement.theta(),
+        budget: Budget::None,
+        rho: None,
+        omega: None,
+        check: false,
+    }
+}
+
+fn check_frame(path: &Path, frame: usize) -> Result<()> {
+    if frame >= path.frames.len() {
+        bail!("path {} has frames 0 to {}, not {frame}", path.name, path.frames.len() - 1);
+    }
+    Ok(())
+}
+
+/// The refined mesh of a frame, and its camera.
+fn frame_mesh(frame: &super::arguments::FrameOf) -> Result<(Mesh, Camera)> {
+    let path = Path::read(&frame.path)?;
+    check_frame(&path, frame.frame)?;
+    let input = Input::one(&frame.file)?;
+    let (log, _) = input.log(false)?;
+    let subject = Subject::new(&input.name(), &log)?;
+    let engine = subject.frame(&path, frame.frame, &options(&frame.refinement))?;
+    Ok((engine.mesh().to_mesh(), path.camera(frame.frame)))
+}
+
+pub(super) fn export(command: &Export) -> Result<()> {
+    super::check_writable(&command.output)?;
+    let (mesh, _) = frame_mesh(&command.frame)?;
+    crate::mesh_io::write_ply(&command.output, &mesh, None)?;
+    print(&format!("{}: {} triangles\n", command.output.display(), mesh.triangles.len()))
+}
+
+pub(super) fn render(command: &Render) -> Result<()> {
+    super::check_writable(&command.output)?;
+    let (mesh, camera) = frame_mesh(&command.frame)?;
+    let style = Style { width: command.width, wires: command.wire, ..Style::default() };
+    let image = if command.outside {
+        render::render_outside(&mesh, &camera, &style)
+    } else {
+        render::render(&mesh, &camera, &style)
+    };
+    image.write_png(&command.output)?;
+    print(&format!("{}: {} triangles\n", command.output.display(), mesh.triangles.len()))
+}
+
+pub(super) fn deviation(command: &Deviation) -> Result<()> {
+    let path = Path::read(&command.path)?;
+    for &frame in &command.frames {
+        check_frame(&path, frame)?;
+    }
+    let input = Input::one(&command.file)?;
+    let (log, _) = input.log(false)?;
+    let against = match command.against.as_slice() {
+        [] => None,
+        arguments => Some(Input::one(arguments)?.mesh()?),
+    };
+    let subject = Subject::new(&input.name(), &log)?;
+    let reference = Reference::new(against.as_ref().unwrap_or(&log.mesh));
+    let options = options(&command.refinement);
+    let mut text = String::new();
+    let mut values = Vec::new();
+    for &frame in &command.frames {
+        let measured = stage(&format!("{}: measuring frame {frame}", input.name()), |_| {
+            let engine = subject.frame(&path, frame, &options)?;
+            anyhow::Ok(reference.deviation(&engine.mesh().to_mesh(), &path.camera(frame), LINES))
+        })?;
+        let mut value = measured.to_json();
+        value["frame"] = frame.into();
+        values.push(value);
+        let _ = writeln!(text, "frame {frame}\n{measured}");
+    }
+    if command.json { print(&format!("{:#}\n", serde_json::Value::from(values))) } else { print(&text) }
+}

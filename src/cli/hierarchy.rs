@@ -1,0 +1,112 @@
+//! `build`, `info` and `verify`.
+
+use std::fmt::Write;
+
+use anyhow::{Context, Result};
+use serde_json::json;
+use vertex_tree::{CollapseLog, read_log, write_log};
+
+use super::arguments::{Backend, Build, Info, Verify};
+use super::input::Input;
+use super::print;
+use super::progress::stage;
+use crate::simplify;
+
+pub(super) fn build(command: &Build) -> Result<()> {
+    let input = Input::one(&command.input)?;
+    super::check_writable(&command.output)?;
+    let (log, report) = input.log(command.merge_components)?;
+    match command.backend {
+        // The log is all that the in-memory tree needs.
+        Backend::InMemory => {
+            stage(&format!("{}: writing", input.name()), |_| write_log(&command.output, &log))?;
+        }
+    }
+    if let Some(report) = report {
+        print(&describe(&report))?;
+    }
+    Ok(())
+}
+
+/// What a simplification did, in lines.
+fn describe(report: &simplify::Report) -> String {
+    let time = report.preparation + report.simplification + report.conclusion;
+    format!(
+        "triangles            {}\ncollapses            {}\nrounds               {}\nroots                {}\n\
+         depth                {}\ndependency depth     {}\nbase triangles       {}\nlargest error        {}\n\
+         order inversions     {}\nmicroseconds a triangle  {:.2}\n",
+        report.triangles,
+        report.collapses,
+        report.rounds,
+        report.roots,
+        report.tree_depth,
+        report.dependency_depth,
+        report.base_triangles,
+        report.largest_eps,
+        report.inversions,
+        time.as_secs_f64() * 1e6 / report.triangles.max(1) as f64,
+    )
+}
+
+pub(super) fn info(command: &Info) -> Result<()> {
+    let log = read_log(&command.file)?;
+    let bytes = std::fs::metadata(&command.file).with_context(|| command.file.display().to_string())?.len();
+    let forest = log.forest()?;
+    let roots = forest.roots().count();
+    let largest = log.collapses.iter().map(|c| c.bounds.eps).fold(0.0, f32::max);
+    let (lo, hi) = log.mesh.bounding_box().unwrap_or_default();
+    let per_triangle = bytes as f64 / log.mesh.triangles.len().max(1) as f64;
+    if command.json {
+        let value = json!({
+            "format": "collapse log",
+            "version": 1,
+            "bytes": bytes,
+            "bytes_per_triangle": per_triangle,
+            "vertices": log.mesh.positions.len(),
+            "triangles": log.mesh.triangles.len(),
+            "collapses": log.collapses.len(),
+            "roots": roots,
+            "depth": forest.depth(),
+            "base_triangles": base_triangles(&log),
+            "largest_error": largest,
+            "bounding_box": [lo, hi],
+        });
+        return print(&format!("{value:#}\n"));
+    }
+    let mut text = String::new();
+    let mut line = |name: &str, value: String| {
+        let _ = writeln!(text, "{name:20} {value}");
+    };
+    line("format", "collapse log, version 1 (backend in-memory)".to_owned());
+    line("bytes", format!("{bytes} ({per_triangle:.1} a triangle)"));
+    line("vertices", log.mesh.positions.len().to_string());
+    line("triangles", log.mesh.triangles.len().to_string());
+    line("collapses", log.collapses.len().to_string());
+    line("roots", roots.to_string());
+    line("depth", forest.depth().to_string());
+    line("base triangles", base_triangles(&log).to_string());
+    line("largest error", largest.to_string());
+    line("bounding box", format!("{lo:?} {hi:?}"));
+    print(&text)
+}
+
+fn base_triangles(log: &CollapseLog) -> usize {
+    crate::cut::Displayed::new(log, &vec![false; log.collapses.len()]).triangles.len()
+}
+
+/// Everything that reading checks, and that bounds are nested: what the criterion relies on.
+pub(super) fn verify(command: &Verify) -> Result<()> {
+    let log = read_log(&command.file)?;
+    let forest = log.forest()?;
+    for (n, (collapse, &parent)) in log.collapses.iter().zip(&forest.parent).enumerate() {
+        if let Some(above) = log.collapses.get(parent as usize) {
+            let (inner, outer) = (&collapse.bounds, &above.bounds);
+            anyhow::ensure!(
+                crate::criterion::is_nested(inner, outer),
+                "{}: node {n} is not within its parent {parent}: {inner:?}, {outer:?}",
+                command.file.display()
+            );
+        }
+    }
+    print(&format!("{}: {} collapses, all in order\n", command.file.display(), log.collapses.len()))
+}

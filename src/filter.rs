@@ -1,0 +1,323 @@
+//! A vectorised filter in f32 before the canonical predicate: which nodes are certain to be wanted, or not to be.
+//!
+//! The filter evaluates the criterion (see [`criterion`](crate::criterion)) for a whole [`Block`] in single precision
+//! and is certain only outside of an error band. Everything inside the band goes on to the canonical predicate in f64,
+//! so the outcome is the predicate's, whatever vector instructions the processor has.
+//!
+//! # The error band
+//!
+//! Let `u = 2^-24`, `M = |e|` and let a hat mark what is computed. Rounding the eye and the difference displaces the
+//! centre by at most `2u (M + d)`. With that, `|d^ - d| <= 5u (M + d)`, `|a^ - a| <= 6u (M + d)`, `|R^ - R| <= 3u R`,
+//! and `b = r + a sin beta` is good to `9u (M + d + r)`. The half widths used,
+//!
+//! ```text
+//! margin       = 16u (M + d^ + r)       of differences of lengths
+//! coarse band  = margin + 16u R^
+//! t            = d^ + r + margin
+//! visible band = 64u t (M + t)          of p^2 cos^2 beta - b^2
+//! ```
+//!
+//! leave room for their own rounding. The last: `p^2 = d^2 - a^2` is good to `24u d (M + d) + 4u d^2`, and squaring
+//! `b +- margin` loses `2u t^2`. A tiny constant in the margin covers what underflows; what overflows is infinite or
+//! not a number, for which no comparison below is certain.
+
+#[cfg(test)]
+use vertex_tree::Bounds;
+
+use crate::criterion::Criterion;
+use crate::motion::Speed;
+use crate::packed::{Block, LANES};
+use crate::view::View;
+
+/// `16u` and `64u`.
+const MARGIN: f32 = 16.0 / 16_777_216.0;
+const VISIBLE_BAND: f32 = 64.0 / 16_777_216.0;
+/// The square of this is a normal number, and products of it with the factors above are not lost among the
+/// subnormal ones.
+const TINY: f32 = 1e-18;
+
+/// A view rounded to f32, with the criterion's form of `R = r k_radius + eps k_eps`.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Lens {
+    eye: [f32; 3],
+    direction: [f32; 3],
+    cos2_beta: f32,
+    cos_beta: f32,
+    sin_beta: f32,
+    k_radius: f32,
+    k_eps: f32,
+    /// `dR/dk` likewise.
+    slope_radius: f32,
+    slope_eps: f32,
+    /// `M`, rounded up.
+    eye_length: f32,
+}
+
+impl Lens {
+    pub fn new(criterion: Criterion, view: &View) -> Self {
+        let eye = view.eye.as_vec3().to_array();
+        let k = view.k as f32;
+        let (k_radius, k_eps, slope_radius, slope_eps) = match criterion {
+            Criterion::ScreenError => (1.0, k, 0.0, 1.0),
+            Criterion::SphereSize => (k, 0.0, 1.0, 0.0),
+        };
+        Self {
+            eye,
+            direction: view.direction.as_vec3().to_array(),
+            cos2_beta: (view.cos_beta * view.cos_beta) as f32,
+            cos_beta: view.cos_beta as f32,
+            sin_beta: view.sin_beta as f32,
+            k_radius,
+            k_eps,
+            slope_radius,
+            slope_eps,
+            eye_length: (view.eye.length() as f32).next_up(),
+        }
+    }
+}
+
+/// For each entry of a block whether the filter is certain, 1 or 0: that some view wants the node if `WANTED`, that
+/// none does if not.
+#[inline(always)]
+pub(crate) fn certainly<const WANTED: bool>(block: &Block, lenses: &[Lens]) -> [u32; LANES] {
+    let mut certain = [u32::from(!WANTED); LANES];
+    for lens in lenses {
+        for i in 0..LANES {
+            let (x, y, z) = (block.x[i] - lens.eye[0], block.y[i] - lens.eye[1], block.z[i] - lens.eye[2]);
+            let (r, eps) = (block.radius[i], block.eps[i]);
+            let d2 = x * x + y * y + z * z;
+            let d = d2.sqrt();
+            let reach = r * lens.k_radius + eps * lens.k_eps;
+            let margin = MARGIN * (lens.eye_length + d + r) + TINY;
+            let coarse_band = margin + MARGIN * reach;
+            let a = x * lens.direction[0] + y * lens.direction[1] + z * lens.direction[2];
+            let p2_cos2 = (d2 - a * a) * lens.cos2_beta;
+            let b = r + a * lens.sin_beta;
+            let t = d + r + margin;
+            let visible_band = VISIBLE_BAND * t * (lens.eye_length + t);
+            if WANTED {
+                let low = b - margin;
+                let coarse = d + coarse_band <= reach;
+                let inside = d + margin <= r;
+                // Ahead of the eye the line that bounds the cone is its nearest part.
+                let visible = (a >= margin) & (low >= 0.0) & (p2_cos2 + visible_band <= low * low);
+                certain[i] |= u32::from(coarse & (inside | visible));
+            } else {
+                let high = b + margin;
+                let fine = d > reach + coarse_band;
+                // The line is at most as far away as the cone, so this holds behind the apex too.
+                let invisible = (high < 0.0) | (p2_cos2 > high * high + visible_band);
+                certain[i] &= u32::from(fine | invisible);
+            }
+        }
+    }
+    certain
+}
+
+/// For each entry of a block, how many frames at full speed must pass before its status can have to change: a boundary
+/// node's where the tag is 0, otherwise a collapsible one's. Never late; 0 where the filter can not say.
+///
+/// The time bounds of [`Criterion::earliest_unfold`] and [`Criterion::earliest_fold`], taken at the ends of the error
+/// band. `f` is computed from both ends of the band of `p^2`, as near the axis the root magnifies it.
+#[inline(always)]
+pub(crate) fn earliest(block: &Block, lenses: &[Lens], speed: &Speed) -> [f32; LANES] {
+    // Rounded up, or a speed that f32 can not hold would be none at all.
+    let up = |x: f64| if x > 0.0 { (x as f32).next_up() } else { 0.0 };
+    let (rho, omega, kappa) = (up(speed.rho), up(speed.omega), up(speed.kappa));
+    let mut folds = [0.0_f32; LANES];
+    let mut unfolds = [f32::INFINITY; LANES];
+    for lens in lenses {
+        for i in 0..LANES {
+            let (x, y, z) = (block.x[i] - lens.eye[0], block.y[i] - lens.eye[1], block.z[i] - lens.eye[2]);
+            let (r, eps) = (block.radius[i], block.eps[i]);
+            let d2 = x * x + y * y + z * z;
+            let d = d2.sqrt();
+            let reach = r * lens.k_radius + eps * lens.k_eps;
+            let reach_slope = r * lens.slope_radius + eps * lens.slope_eps;
+            let margin = MARGIN * (lens.eye_length + d + r) + TINY;
+            let coarse_band = margin + MARGIN * reach;
+            let a = x * lens.direction[0] + y * lens.direction[1] + z * lens.direction[2];
+            let p2 = d2 - a * a;
+            let t = d + r + margin;
+            let band = VISIBLE_BAND * t * (lens.eye_length + t);
+            let p_low = larger(p2 - band, 0.0).sqrt();
+            let p_high = (p2 + band).sqrt();
+            // Behind the apex, the distance from the cone is that from the eye, and never less than that from its line.
+            let line_low = p_low * lens.cos_beta - a * lens.sin_beta;
+            let line_high = p_high * lens.cos_beta - a * lens.sin_beta;
+            let behind = a * lens.cos_beta + p_high * lens.sin_beta < -margin;
+            let ahead = a * lens.cos_beta + p_low * lens.sin_beta > margin;
+            let f_low = if behind { d } else { line_low };
+            let f_high = if ahead { line_high } else { d };
+
+            let sideways = rate(rho + omega * (d + margin));
+            let towards = rate(rho + kappa * reach_slope);
+            let appears = frames(f_low - r - 2.0 * margin, sideways);
+            let disappears = frames(r - f_high - 2.0 * margin, sideways);
+            let coarse = frames(d - reach - 2.0 * coarse_band, towards);
+            let fine = frames(reach - d - 2.0 * coarse_band, towards);
+            let outside = frames(r - d - 2.0 * margin, rate(rho));
+            unfolds[i] = smaller(unfolds[i], larger(appears, coarse));
+            folds[i] = larger(folds[i], larger(outside, smaller(disappears, fine)));
+        }
+    }
+    std::array::from_fn(|i| {
+        let frames = if block.tag[i] == 0 { unfolds[i] } else { folds[i] };
+        // It may be the division that has overflown, not the time that is infinite.
+        if frames == f32::INFINITY { f32::MAX } else { frames }
+    })
+}
+
+/// A rate, and more than its computation and a division by it can have lost, also to underflow.
+#[inline(always)]
+fn rate(rate: f32) -> f32 {
+    rate * (1.0 + 1.0 / 1_048_576.0) + f32::MIN_POSITIVE
+}
+
+/// 0 also for what is not a number.
+#[inline(always)]
+fn frames(distance: f32, rate: f32) -> f32 {
+    if distance > 0.0 { distance / rate } else { 0.0 }
+}
+
+/// Comparisons as the processor has them, without care for what is not a number.
+#[inline(always)]
+fn larger(a: f32, b: f32) -> f32 {
+    if a > b { a } else { b }
+}
+#[inline(always)]
+fn smaller(a: f32, b: f32) -> f32 {
+    if a < b { a } else { b }
+}
+
+/// The lenses of some views.
+pub(crate) struct Lenses {
+    lenses: [Lens; MOST_VIEWS],
+    count: usize,
+}
+
+/// Views that the filter takes: two eyes and the cascades of a shadow map.
+pub(crate) const MOST_VIEWS: usize = 8;
+
+impl Lenses {
+    /// `None` for more than [`MOST_VIEWS`] views.
+    pub fn new(criterion: Criterion, views: &[View]) -> Option<Self> {
+        let blank = Lens {
+            eye: [0.0; 3],
+            direction: [0.0; 3],
+            cos2_beta: 0.0,
+            cos_beta: 0.0,
+            sin_beta: 0.0,
+            k_radius: 0.0,
+            k_eps: 0.0,
+            slope_radius: 0.0,
+            slope_eps: 0.0,
+            eye_length: 0.0,
+        };
+        let mut lenses = [blank; MOST_VIEWS];
+        for (i, view) in views.iter().enumerate() {
+            *lenses.get_mut(i)? = Lens::new(criterion, view);
+        }
+        Some(Self { lenses, count: views.len() })
+    }
+
+    #[inline(always)]
+    pub fn as_slice(&self) -> &[Lens] {
+        &self.lenses[..self.count]
+    }
+}
+
+/// The entries among the first `used` that are not certain, as a bit mask.
+#[inline(always)]
+pub(crate) fn doubtful(certain: &[u32; LANES], used: usize) -> u32 {
+    // Seldom is any.
+    if certain.iter().fold(1, |all, c| all & c) == 1 {
+        return 0;
+    }
+    let mask = (0..LANES).fold(0, |mask, i| mask | (u32::from(certain[i] == 0) << i));
+    mask & ((1_u32 << used) - 1)
+}
+
+/// Calls `f` with each bit that is set.
+#[inline(always)]
+pub(crate) fn for_each_bit(mut mask: u32, mut f: impl FnMut(usize)) {
+    while mask != 0 {
+        f(mask.trailing_zeros() as usize);
+        mask &= mask - 1;
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use glam::DVec3;
+    use proptest::prelude::*;
+
+    proptest! {
+        #![proptest_config(ProptestConfig::with_cases(4000))]
+
+        /// Wherever the filter is certain the predicate agrees, near the marks above all.
+        #[test]
+        fn is_never_certain_of_the_opposite(
+            eye in prop::array::uniform3(prop_oneof![-10.0..10.0, -1e6..1e6, -1e-3..1e-3]),
+            aim in prop::array::uniform3(-1.0..1.0_f64),
+            beta in 0.05..1.5_f64,
+            k in prop_oneof![Just(1.0), 1.0..2000.0, Just(1e30), Just(1e300)],
+            scale in prop_oneof![Just(1.0), Just(1e-25), Just(1e-15), Just(1e4), Just(1e25)],
+            sphere_size in any::<bool>(),
+            rho in prop_oneof![Just(0.0), Just(1e-50), 0.01..10.0],
+            omega in prop_oneof![Just(0.0), 1e-6..0.1],
+            kappa in prop_oneof![Just(0.0), 0.1..10.0],
+            seeds in prop::array::uniform16((any::<u32>(), any::<u32>(), any::<u32>(), any::<u32>())),
+        ) {
+            let criterion = if sphere_size { Criterion::SphereSize } else { Criterion::ScreenError };
+            let eye = DVec3::from(eye) * scale;
+            let direction = DVec3::from(aim).normalize_or(DVec3::X);
+            let view = View { eye, direction, cos_beta: beta.cos(), sin_beta: beta.sin(), k };
+            let speed = Speed { rho, omega, kappa };
+            let mut block = Block::EMPTY;
+            let mut all = Vec::new();
+            for (lane, &(s0, s1, s2, s3)) in seeds.iter().enumerate() {
+                let unit = |s: u32| f64::from(s) / f64::from(u32::MAX);
+                // About the direction at an angle near beta, or anywhere.
+                let side = direction.any_orthonormal_vector();
+                let side = glam::DQuat::from_axis_angle(direction, unit(s0) * 6.3) * side;
+                let angle = if s1 % 2 == 0 { beta * (1.0 + (unit(s2) - 0.5) * 1e-5) } else { unit(s2) * 3.2 };
+                let distance = scale * unit(s3) * [1e-3, 1.0, 100.0, 1e5][s0 as usize % 4];
+                let center = eye + (direction * angle.cos() + side * angle.sin()) * distance;
+                let radius = distance * unit(s1) * [0.0, 1e-6, 1.0, 2.0][s1 as usize / 2 % 4];
+                // On the mark of the screen error, give or take a few times the precision.
+                let near = (distance - radius).max(0.0) / k * (1.0 + (unit(s0) - 0.5) * 1e-6);
+                let eps = if s2 % 2 == 0 { near } else { near * unit(s3) * 2.0 };
+                let limit = |x: f64| (x as f32).clamp(-1e38, 1e38);
+                let bounds = Bounds {
+                    center: center.to_array().map(limit),
+                    radius: limit(radius),
+                    eps: limit(eps),
+                };
+                block.set(lane, &bounds, 0);
+                all.push(bounds);
+            }
+            let lenses = Lenses::new(criterion, &[view]).unwrap();
+            let certainly_wanted = certainly::<true>(&block, lenses.as_slice());
+            let certainly_unwanted = certainly::<false>(&block, lenses.as_slice());
+            for (lane, bounds) in all.iter().enumerate() {
+                let wanted = criterion.unfold(&[view], bounds);
+                prop_assert!(certainly_wanted[lane] == 0 || wanted, "{bounds:?}");
+                prop_assert!(certainly_unwanted[lane] == 0 || !wanted, "{bounds:?}");
+                // No time bound may be later than the one in f64, which leaves next to nothing to rounding, nor say
+                // that a node that should change need not.
+                for fold in [false, true] {
+                    block.tag[lane] = u32::from(fold);
+                    let filtered = f64::from(earliest(&block, lenses.as_slice(), &speed)[lane]);
+                    let exact = if fold {
+                        criterion.earliest_fold(&[view], &speed, bounds)
+                    } else {
+                        criterion.earliest_unfold(&[view], &speed, bounds)
+                    };
+                    prop_assert!(filtered <= exact, "{bounds:?}, fold {fold}: {filtered} > {exact}");
+                }
+            }
+        }
+    }
+}

@@ -1,0 +1,265 @@
+//! Reading and writing path files.
+
+use std::fmt::Write as _;
+use std::io;
+use std::path::{Path as FilePath, PathBuf};
+
+use glam::{DQuat, DVec3};
+use thiserror::Error;
+
+use super::{Path, Pose};
+
+/// Why a path could not be read or written. Lines count from 1.
+#[derive(Debug, Error)]
+#[non_exhaustive]
+pub enum PathError {
+    /// The file could not be read, or is not UTF-8 text.
+    #[error("{}: {source}", file.display())]
+    Read {
+        /// The file.
+        file: PathBuf,
+        /// What the system said.
+        source: io::Error,
+    },
+    /// The file could not be written.
+    #[error("{}: {source}", file.display())]
+    Write {
+        /// The file.
+        file: PathBuf,
+        /// What the system said.
+        source: io::Error,
+    },
+    /// A frame has more or fewer than eight columns.
+    #[error("{}:{line}: a frame has 8 columns, t x y z qx qy qz qw, not {columns}", file.display())]
+    Columns {
+        /// The file.
+        file: PathBuf,
+        /// The line.
+        line: usize,
+        /// How many columns there are.
+        columns: usize,
+    },
+    /// A column is not a number, or not a finite one.
+    #[error("{}:{line}: {value:?} is not a finite number", file.display())]
+    Number {
+        /// The file.
+        file: PathBuf,
+        /// The line.
+        line: usize,
+        /// The column as it stands in the file.
+        value: String,
+    },
+    /// A frame is not later than the one before.
+    #[error("{}:{line}: the time {time} is not after {previous}", file.display())]
+    Time {
+        /// The file.
+        file: PathBuf,
+        /// The line.
+        line: usize,
+        /// Its time.
+        time: f64,
+        /// The time of the frame before.
+        previous: f64,
+    },
+    /// A quaternion is zero, or too small or large to be made a rotation.
+    #[error("{}:{line}: the quaternion {value:?} is no rotation", file.display())]
+    Rotation {
+        /// The file.
+        file: PathBuf,
+        /// The line.
+        line: usize,
+        /// x, y, z and w.
+        value: [f64; 4],
+    },
+    /// The value of a header line is out of range.
+    #[error("{}:{line}: {key} {value:?} is not {range}", file.display())]
+    Header {
+        /// The file.
+        file: PathBuf,
+        /// The line.
+        line: usize,
+        /// Which header it is.
+        key: &'static str,
+        /// Its value as it stands in the file.
+        value: String,
+        /// What it may be.
+        range: &'static str,
+    },
+    /// A header line that every path needs is missing.
+    #[error("{}: there is no header line `# {key} ...`", file.display())]
+    MissingHeader {
+        /// The file.
+        file: PathBuf,
+        /// Which header is missing.
+        key: &'static str,
+    },
+    /// There are no frames.
+    #[error("{}: there are no frames", file.display())]
+    NoFrames {
+        /// The file.
+        file: PathBuf,
+    },
+}
+
+impl Path {
+    /// Reads a path file.
+    pub fn read(file: &FilePath) -> Result<Self, PathError> {
+        let text = std::fs::read_to_string(file)
+            .map_err(|source| PathError::Read { file: file.to_owned(), source })?;
+        Self::parse(file, &text)
+    }
+
+    /// Reads the text of a path file; `file` names it in errors.
+    ///
+    /// ```text
+    /// # foldfront path
+    /// # name city-calm
+    /// # units m
+    /// # fov 60
+    /// # aspect 1.7777777777777777
+    /// # t x y z qx qy qz qw
+    /// 0 -521.3 -281.1 5.5 0.5 -0.5 -0.5 0.5
+    /// ```
+    ///
+    /// The field of view is vertical, in degrees, or in radians where `rad` follows. Field of view and aspect must be
+    /// given; the name is otherwise that of the file. Other comments are skipped. A quaternion whose length is within
+    /// a millionth of 1 is kept to the bit, any other is normalised.
+    pub fn parse(file: &FilePath, text: &str) -> Result<Self, PathError> {
+        let stem = file.file_stem().map_or_else(String::new, |stem| stem.to_string_lossy().into_owned());
+        let mut path =
+            Self { name: stem, units: "units".to_owned(), fov_y: 0.0, aspect: 0.0, frames: Vec::new() };
+        for (index, content) in text.lines().enumerate() {
+            let at = Line { file, line: index + 1 };
+            let content = content.trim();
+            if let Some(comment) = content.strip_prefix('#') {
+                at.header(comment.trim(), &mut path)?;
+            } else if !content.is_empty() {
+                let pose = at.pose(content)?;
+                if let Some(&Pose { time: previous, .. }) = path.frames.last() {
+                    at.check_time(pose.time, previous)?;
+                }
+                path.frames.push(pose);
+            }
+        }
+        let missing = |key| PathError::MissingHeader { file: file.to_owned(), key };
+        if path.fov_y == 0.0 {
+            return Err(missing("fov"));
+        }
+        if path.aspect == 0.0 {
+            return Err(missing("aspect"));
+        }
+        if path.frames.is_empty() {
+            return Err(PathError::NoFrames { file: file.to_owned() });
+        }
+        Ok(path)
+    }
+
+    /// The text of the path file. Reading it gives the same path, to the bit; line breaks in the name or the units
+    /// become spaces.
+    #[must_use]
+    pub fn to_text(&self) -> String {
+        let one_line = |text: &str| text.split_whitespace().collect::<Vec<_>>().join(" ");
+        let degrees = self.fov_y.to_degrees();
+        let rounded = (degrees * 1e9).round() / 1e9;
+        let fov = match [rounded, degrees].into_iter().find(|degrees| degrees.to_radians() == self.fov_y) {
+            Some(degrees) => degrees.to_string(),
+            None => format!("{} rad", self.fov_y),
+        };
+        let mut text = format!(
+            "# foldfront path\n# name {}\n# units {}\n# fov {fov}\n# aspect {}\n# t x y z qx qy qz qw\n",
+            one_line(&self.name),
+            one_line(&self.units),
+            self.aspect
+        );
+        for Pose { time, position: p, orientation: q } in &self.frames {
+            // Writing to a string can not fail.
+            let _ = writeln!(text, "{time} {} {} {} {} {} {} {}", p.x, p.y, p.z, q.x, q.y, q.z, q.w);
+        }
+        text
+    }
+
+    /// Writes a path file, under a temporary name first.
+    pub fn write(&self, file: &FilePath) -> Result<(), PathError> {
+        crate::output::write(file, self.to_text().as_bytes())
+            .map_err(|source| PathError::Write { file: file.to_owned(), source })
+    }
+}
+
+/// A line of a file, for errors.
+#[derive(Clone, Copy)]
+pub(super) struct Line<'a> {
+    pub file: &'a FilePath,
+    pub line: usize,
+}
+
+impl Line<'_> {
+    fn header(self, comment: &str, path: &mut Path) -> Result<(), PathError> {
+        let (key, value) = comment.split_once(char::is_whitespace).unwrap_or((comment, ""));
+        let value = value.trim();
+        let out_of_range = |key, range| PathError::Header {
+            file: self.file.to_owned(),
+            line: self.line,
+            key,
+            value: value.to_owned(),
+            range,
+        };
+        match key {
+            "name" if !value.is_empty() => value.clone_into(&mut path.name),
+            "units" if !value.is_empty() => value.clone_into(&mut path.units),
+            "fov" => {
+                let (number, unit) = value.split_once(char::is_whitespace).unwrap_or((value, ""));
+                let number: f64 = number.parse().unwrap_or(f64::NAN);
+                path.fov_y = if unit.trim() == "rad" { number } else { number.to_radians() };
+                if !(path.fov_y > 0.0 && path.fov_y < std::f64::consts::PI) {
+                    return Err(out_of_range("fov", "above 0 and below 180 degrees"));
+                }
+            }
+            "aspect" => {
+                path.aspect = value.parse().unwrap_or(f64::NAN);
+                if !(path.aspect > 0.0 && path.aspect.is_finite()) {
+                    return Err(out_of_range("aspect", "a finite number above 0"));
+                }
+            }
+            _ => {}
+        }
+        Ok(())
+    }
+
+    /// The numbers of a line.
+    pub fn numbers(self, content: &str) -> Result<Vec<f64>, PathError> {
+        let number = |value: &str| {
+            value.parse().ok().filter(|x: &f64| x.is_finite()).ok_or_else(|| PathError::Number {
+                file: self.file.to_owned(),
+                line: self.line,
+                value: value.to_owned(),
+            })
+        };
+        content.split_whitespace().map(number).collect()
+    }
+
+    /// `t x y z qx qy qz qw`.
+    pub fn pose(self, content: &str) -> Result<Pose, PathError> {
+        let numbers = self.numbers(content)?;
+        let &[time, x, y, z, qx, qy, qz, qw] = numbers.as_slice() else {
+            let columns = numbers.len();
+            return Err(PathError::Columns { file: self.file.to_owned(), line: self.line, columns });
+        };
+        Ok(Pose { time, position: DVec3::new(x, y, z), orientation: self.rotation([qx, qy, qz, qw])? })
+    }
+
+    pub fn rotation(self, value: [f64; 4]) -> Result<DQuat, PathError> {
+        let quaternion = DQuat::from_array(value);
+        let squared = quaternion.length_squared();
+        if !(1e-24..1e24).contains(&squared) {
+            return Err(PathError::Rotation { file: self.file.to_owned(), line: self.line, value });
+        }
+        Ok(if (squared - 1.0).abs() <= 2e-6 { quaternion } else { quaternion.normalize() })
+    }
+
+    pub fn check_time(self, time: f64, previous: f64) -> Result<(), PathError> {
+        if time > previous {
+            return Ok(());
+        }
+        Err(PathError::Time { file: self.file.to_owned(), line: self.line, time, previous })
+    }
+}

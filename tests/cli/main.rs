@@ -1,0 +1,6 @@
+//! The program as its users run it: arguments in; files, lines and an exit code out.
+
+mod commands;
+mod comparison;
+mod failures;
+mod workplace;

@@ -1,0 +1,164 @@
+//! Every backend with every exact strategy, and what each of them must do: follow the brute-force cut.
+//!
+//! A new backend adds a line to [`BACKENDS`].
+
+use std::sync::Arc;
+
+use foldfront::CollapseLog;
+use foldfront::budget::Budget;
+use foldfront::cut::Displayed;
+use foldfront::engine::{Engine, FrameReport, Settings};
+use foldfront::oracle::Oracle;
+use foldfront::refine::Strategy;
+use foldfront::vertex_tree::{NullSink, VertexTree};
+use foldfront::view::View;
+use in_memory::{Hierarchy, InMemoryTree};
+
+/// Opens a hierarchy once for each of the settings.
+type Open = fn(&CollapseLog, &[Settings]) -> Vec<Box<dyn Follower>>;
+
+/// The backends and how to open them.
+const BACKENDS: [(&str, Open); 1] = [("in-memory", |log, settings| {
+    let hierarchy = Arc::new(Hierarchy::new(log).unwrap());
+    follow(settings, || InMemoryTree::new(hierarchy.clone()))
+})];
+
+fn follow<T: VertexTree + 'static>(settings: &[Settings], tree: impl Fn() -> T) -> Vec<Box<dyn Follower>> {
+    let engine = |&settings: &Settings| Engine::new(tree(), NullSink, settings).unwrap();
+    settings.iter().map(|settings| Box::new(engine(settings)) as Box<dyn Follower>).collect()
+}
+
+/// An engine, whatever its backend.
+trait Follower {
+    fn advance(&mut self, views: &[View]) -> FrameReport;
+    fn set_budget(&mut self, budget: Budget);
+    fn strategy(&self) -> Strategy;
+    /// The views of the last frame, as the budget made them.
+    fn views(&self) -> &[View];
+    /// How the front differs from the oracle's cut for the same views, in words.
+    fn difference(&self, oracle: &mut Oracle) -> String;
+}
+
+impl<T: VertexTree> Follower for Engine<T, NullSink> {
+    fn advance(&mut self, views: &[View]) -> FrameReport {
+        self.advance(views).unwrap()
+    }
+
+    fn set_budget(&mut self, budget: Budget) {
+        self.set_budget(budget);
+    }
+
+    fn strategy(&self) -> Strategy {
+        self.settings().strategy
+    }
+
+    fn views(&self) -> &[View] {
+        self.views()
+    }
+
+    fn difference(&self, oracle: &mut Oracle) -> String {
+        format!("{:?}", oracle.compare(self))
+    }
+}
+
+/// What a walk amounted to, for tests to make sure that it was worth something.
+#[derive(Clone, Copy, Debug, Default)]
+pub struct Totals {
+    pub frames: u64,
+    /// Unfolds and folds.
+    pub changes: u64,
+    /// Tests of the criterion that the event queue made.
+    pub event_tests: u64,
+    /// Nodes that the oracle tested.
+    pub oracle_tests: u64,
+    /// The smallest and the largest number of triangles displayed.
+    pub triangles: Option<(u64, u64)>,
+}
+
+/// All backends with all exact strategies, along one walk through one hierarchy.
+pub struct Conformance<'a> {
+    log: &'a CollapseLog,
+    settings: Settings,
+    oracle: Oracle,
+    followers: Vec<(&'static str, Box<dyn Follower>)>,
+    pub totals: Totals,
+}
+
+/// The triangles are counted by brute force once in so many frames.
+const COUNT_EVERY: u64 = 251;
+
+impl<'a> Conformance<'a> {
+    pub fn new(log: &'a CollapseLog, settings: Settings) -> Self {
+        let exact: Vec<Settings> = Strategy::ALL
+            .into_iter()
+            .filter(|strategy| strategy.is_exact())
+            .map(|strategy| Settings { strategy, ..settings })
+            .collect();
+        let open = |&(name, open): &(&'static str, Open)| {
+            open(log, &exact).into_iter().map(move |follower| (name, follower))
+        };
+        Self {
+            log,
+            settings,
+            oracle: Oracle::new(log).unwrap(),
+            followers: BACKENDS.iter().flat_map(open).collect(),
+            totals: Totals::default(),
+        }
+    }
+
+    pub fn set_budget(&mut self, budget: Budget) {
+        self.followers.iter_mut().for_each(|(_, follower)| follower.set_budget(budget));
+    }
+
+    /// Moves all of them to these views. The cut of each must be that of the oracle for what its own budget made of
+    /// them: a budget in time steers each its own way.
+    #[track_caller]
+    pub fn advance_each(&mut self, views: &[View]) {
+        for (backend, follower) in &mut self.followers {
+            let report = follower.advance(views);
+            let difference = follower.difference(&mut self.oracle);
+            let frame = self.totals.frames;
+            assert_eq!(difference, "None", "{backend}, {}, frame {frame}", follower.strategy().name());
+            self.totals.changes += report.unfolds + report.folds;
+        }
+        self.totals.frames += 1;
+    }
+
+    /// Moves all of them to these views. The cut of each must be that of the oracle, which is asked once for all.
+    #[track_caller]
+    pub fn advance(&mut self, views: &[View]) {
+        let Self { log, settings, oracle, followers, totals } = self;
+        let reports: Vec<FrameReport> =
+            followers.iter_mut().map(|(_, follower)| follower.advance(views)).collect();
+        // A budget in triangles steers all alike.
+        oracle.cut(settings.criterion, followers[0].1.views());
+        let (hash, nodes) = (oracle.cut_hash(), oracle.active_nodes() as u64);
+        let triangles = reports[0].triangles;
+        let frame = totals.frames;
+        for ((backend, follower), report) in followers.iter().zip(&reports) {
+            let name = || format!("{backend}, {}, frame {frame}", follower.strategy().name());
+            assert_eq!(report.triangles, triangles, "{}: triangles", name());
+            assert_eq!(
+                report.misses + report.forced,
+                0,
+                "{}: nothing is missing here, nothing forced",
+                name()
+            );
+            if (report.cut_hash, report.active_nodes) != (hash, nodes) {
+                panic!("{}: {}; views {:?}", name(), follower.difference(oracle), follower.views());
+            }
+            if follower.strategy() == Strategy::Event {
+                totals.event_tests += report.tests;
+            }
+        }
+        if frame.is_multiple_of(COUNT_EVERY) {
+            let expected = Displayed::new(log, oracle.active()).triangles.len() as u64;
+            assert_eq!(triangles, expected, "frame {frame}: triangles displayed");
+        }
+        totals.frames += 1;
+        totals.changes += reports[0].unfolds + reports[0].folds;
+        totals.oracle_tests += oracle.active().len() as u64;
+        let (least, most) = totals.triangles.unwrap_or((triangles, triangles));
+        totals.triangles = Some((least.min(triangles), most.max(triangles)));
+    }
+}
