@@ -2,7 +2,7 @@
 
 mod ball;
 mod candidates;
-mod fan;
+mod faces;
 mod legality;
 mod marks;
 mod nodes;

@@ -14,7 +14,9 @@ const FLAT_SQUARED: f32 = 1e-10;
 /// Whether `v` can merge into `u`. `star` is the star of `v`. Along a virtual edge, and where components have been
 /// joined, the topology is no longer that of the input, and need not be kept.
 pub(super) fn is_legal(v: u32, u: u32, star: &[Spoke], surface: &Surface, marks: &mut Marks) -> bool {
-    keeps_orientation(v, u, star, surface)
+    let last_triangles = star.len() == surface.live_triangles && star.iter().all(|spoke| spoke.touches(u));
+    !last_triangles
+        && keeps_orientation(v, u, star, surface)
         && (surface.joined[v as usize]
             || surface.joined[u as usize]
             || !star.iter().any(|spoke| spoke.touches(u))

@@ -1,9 +1,17 @@
 //! Spheres and errors of the nodes, nested and saturated over everything that must be folded before.
 //!
-//! A collapse replaces the star of a vertex. It can be made only where the triangles of that star are as they were
-//! when it was recorded, so it depends on its two children in the tree *and* on the collapses that last changed those
-//! triangles (the arcs of a multi-triangulation: De Floriani, Magillo & Puppo 1997). For each of these predecessors
-//! `m` of a node `n`
+//! A collapse replaces the star of a vertex. It can be made only where that star is as it was when the collapse was
+//! recorded, so it depends on the collapses that made the star what it is:
+//!
+//! * its two children in the tree,
+//! * for each triangle of the star, the collapse that last moved a corner of it (these are the arcs of a
+//!   multi-triangulation: De Floriani, Magillo & Puppo 1997),
+//! * the collapse that last took a triangle away from the removed vertex and left no trace in the others. That happens
+//!   at boundaries: when an ear vanishes, its tip is merged away, and no triangle around the third corner changes. Were
+//!   the third corner free to go first, it would drag the ear along. Such a collapse leaves its mark at the vertex, and
+//!   depends on the mark that it overwrites.
+//!
+//! For each of these predecessors `m` of a node `n`
 //!
 //! ```text
 //! |c_n - c_m| + r_m <= r_n    and    eps_m <= eps_n.
@@ -11,8 +19,8 @@
 //!
 //! Both unfold tests of the criterion, `d < r` and `d <= r + eps k`, then pass for `n` wherever they pass for `m`, and
 //! a view cone that touches the sphere of `m` touches that of `n`. So the set of nodes that want to be unfolded is
-//! closed under all predecessors, whatever the camera, and the mesh it shows consists of stars as the simplification
-//! itself went through them.
+//! closed under all predecessors, whatever the camera, and every triangle it shows is one that the simplification
+//! itself went through.
 
 use glam::DVec3;
 use vertex_tree::{Bounds, Collapse, NONE};
@@ -35,6 +43,8 @@ pub(super) struct Nodes {
     pub depth: Vec<u32>,
     /// For each vertex, the node at which it now stands, or `NONE`.
     pub top: Vec<u32>,
+    /// For each vertex, the node that last took a triangle from it and gave none, or `NONE`.
+    pub trace: Vec<u32>,
     /// For each vertex, the distance to the farthest corner of its input triangles.
     leaf_radius: Vec<f32>,
     slack: f64,
@@ -50,6 +60,7 @@ impl Nodes {
             keys: Vec::with_capacity(leaf_radius.len()),
             depth: Vec::with_capacity(leaf_radius.len()),
             top: vec![NONE; leaf_radius.len()],
+            trace: vec![NONE; leaf_radius.len()],
             leaf_radius,
             slack: extent * ABSOLUTE_SLACK,
             predecessors: Vec::new(),
@@ -63,12 +74,14 @@ impl Nodes {
     }
 
     /// Makes the node of a collapse. `creators` are the collapses that last changed the triangles around `removed`,
-    /// `NONE` for untouched ones; `positions` are those of the two vertices.
+    /// `NONE` for untouched ones; `bereaved` are the vertices that lose a triangle and get none; `positions` are those of
+    /// the two vertices.
     pub fn add(
         &mut self,
         [removed, kept]: [u32; 2],
         positions: [DVec3; 2],
         creators: impl Iterator<Item = u32>,
+        bereaved: &[u32],
         error: f32,
         key: f32,
     ) {
@@ -82,7 +95,8 @@ impl Nodes {
                 node => self.predecessors.push(node),
             }
         }
-        self.predecessors.extend(creators.filter(|&node| node != NONE));
+        let traces = bereaved.iter().chain([&removed]).map(|&v| self.trace[v as usize]);
+        self.predecessors.extend(creators.chain(traces).filter(|&node| node != NONE));
         self.predecessors.sort_unstable();
         self.predecessors.dedup();
         let (mut eps, mut depth) = (error, 0);
@@ -96,6 +110,9 @@ impl Nodes {
         let radius = radius_around(center.as_dvec3(), &self.balls);
         let radius = round_up((radius + self.slack) * (1.0 + RELATIVE_SLACK));
         self.top[kept as usize] = self.next();
+        for &v in bereaved {
+            self.trace[v as usize] = self.next();
+        }
         self.collapses.push(Collapse {
             removed,
             kept,

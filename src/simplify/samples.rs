@@ -18,7 +18,7 @@
 use glam::Vec3;
 use vertex_tree::NONE;
 
-use super::fan::{Fan, segment_distance_squared};
+use super::faces::{Faces, segment_distance_squared};
 
 /// Sample points that a triangle keeps at most. With more, half of the places go to those with the largest distances,
 /// the others to an even selection of the rest.
@@ -45,8 +45,8 @@ pub(super) struct Samples {
     /// The next point of the same triangle, or `NONE`.
     next: Vec<u32>,
     /// What is there before and after the collapse.
-    old: Fan,
-    new: Fan,
+    old: Faces,
+    new: Faces,
     /// Number of the triangle for each one in `new`.
     triangles: Vec<u32>,
     edges: Vec<SpecialEdge>,
@@ -60,8 +60,8 @@ impl Samples {
     pub fn new(count: usize) -> Samples {
         Samples {
             next: vec![NONE; count],
-            old: Fan::default(),
-            new: Fan::default(),
+            old: Faces::default(),
+            new: Faces::default(),
             triangles: Vec::new(),
             edges: Vec::new(),
             placed: Vec::new(),
@@ -70,26 +70,25 @@ impl Samples {
         }
     }
 
-    /// Starts measuring the collapse of a vertex at `from` into one at `to`.
-    pub fn begin(&mut self, from: Vec3, to: Vec3) {
-        self.old.clear(from);
-        self.new.clear(to);
+    /// Starts measuring a collapse.
+    pub fn begin(&mut self) {
+        self.old.clear();
+        self.new.clear();
         self.triangles.clear();
         self.edges.clear();
         self.placed.clear();
         self.worst = 0.0;
     }
 
-    /// Adds a triangle at `from` that the collapse changes, by its other corners.
-    pub fn add_old(&mut self, b: Vec3, c: Vec3) {
-        self.old.push(b, c);
+    /// Adds a triangle that the collapse changes.
+    pub fn add_old(&mut self, corners: [Vec3; 3]) {
+        self.old.push(corners);
     }
 
-    /// Adds a triangle at `to` that there is after the collapse, by its other corners. Returns its number here.
-    pub fn add_new(&mut self, triangle: u32, b: Vec3, c: Vec3) -> u32 {
+    /// Adds a triangle that there is after the collapse.
+    pub fn add_new(&mut self, triangle: u32, corners: [Vec3; 3]) {
         self.triangles.push(triangle);
-        self.new.push(b, c);
-        self.triangles.len() as u32 - 1
+        self.new.push(corners);
     }
 
     /// Whether there is no triangle after the collapse.
@@ -131,6 +130,13 @@ impl Samples {
         };
         self.worst = self.worst.max(distance_squared);
         self.placed.push(Placed { face, distance_squared, point });
+    }
+
+    /// Measures a vertex that is left without triangles.
+    pub fn measure_lost(&mut self, p: Vec3, kept: Vec3) {
+        let distance_squared =
+            if self.nothing_new() { p.distance_squared(kept) } else { self.new.nearest(p).1 };
+        self.worst = self.worst.max(distance_squared);
     }
 
     /// Measures a point of the new triangles against the old ones.

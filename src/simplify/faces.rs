@@ -1,7 +1,7 @@
-//! Squared distance from a point to triangles around a common corner.
+//! Squared distance from a point to the nearest of a few triangles.
 //!
 //! The nearest point of a triangle is the foot of the perpendicular, if that lies inside, or else on one of the three
-//! edges. With the corner at the origin, edges `b` and `c` from it and normal `n = b x c`, a point is
+//! edges. With one corner at the origin, edges `b` and `c` from it and normal `n = b x c`, a point is
 //! `p = s b + t c + h n`, and
 //!
 //! ```text
@@ -14,10 +14,12 @@
 
 use glam::{Vec3, Vec4};
 
-/// Four triangles, a coordinate in each `Vec4`. Lanes that are not in use hold triangles that are a single point, the
-/// common corner, and are never nearer than the others.
+/// Four triangles, a coordinate in each `Vec4`. Lanes that are not in use hold triangles that are a single point, a
+/// corner of the first, and are never nearer than that.
 #[derive(Clone, Copy, Debug, Default)]
 struct Four {
+    /// One corner, and the edges from it to the others.
+    a: Lanes,
     b: Lanes,
     c: Lanes,
     n: Lanes,
@@ -37,32 +39,29 @@ type Lanes = [Vec4; 3];
 /// A sliver whose height is less than this part of its length is measured by its edges alone; squared.
 const SLIVER: f32 = 1e-10;
 
-/// Triangles around a common corner.
+/// A few triangles.
 #[derive(Debug, Default)]
-pub(super) struct Fan {
-    corner: Vec3,
+pub(super) struct Faces {
     count: usize,
     fours: Vec<Four>,
 }
 
-impl Fan {
-    /// Starts over.
-    pub fn clear(&mut self, corner: Vec3) {
-        self.corner = corner;
+impl Faces {
+    pub fn clear(&mut self) {
         self.count = 0;
         self.fours.clear();
     }
 
-    /// Adds the triangle of the corner, `b` and `c`.
-    pub fn push(&mut self, b: Vec3, c: Vec3) {
+    pub fn push(&mut self, [a, b, c]: [Vec3; 3]) {
         let lane = self.count % 4;
         if lane == 0 {
-            self.fours.push(Four::default());
+            self.fours.push(Four { a: a.to_array().map(Vec4::splat), ..Four::default() });
         }
         self.count += 1;
         if let Some(four) = self.fours.last_mut() {
-            let (b, c) = (b - self.corner, c - self.corner);
+            let (b, c) = (b - a, c - a);
             for axis in 0..3 {
+                four.a[axis][lane] = a[axis];
                 four.b[axis][lane] = b[axis];
                 four.c[axis][lane] = c[axis];
             }
@@ -74,10 +73,9 @@ impl Fan {
         self.fours.iter_mut().for_each(Four::prepare);
     }
 
-    /// The nearest triangle, the first one if several are, and its squared distance. For a fan without triangles, 0
+    /// The nearest triangle, the first one if several are, and its squared distance. Without triangles, 0
     /// and infinity.
     pub fn nearest(&self, p: Vec3) -> (u32, f32) {
-        let p = p - self.corner;
         let mut nearest = (0, f32::INFINITY);
         let mut number = 0;
         for four in &self.fours {
@@ -93,7 +91,6 @@ impl Fan {
 
     /// Squared distance to the nearest triangle, or any value up to `enough` once one has been found that near.
     pub fn distance_squared(&self, p: Vec3, enough: f32) -> f32 {
-        let p = p - self.corner;
         let mut nearest = f32::INFINITY;
         for four in &self.fours {
             nearest = nearest.min(four.distances_squared(p).min_element());
@@ -125,7 +122,7 @@ impl Four {
     }
 
     fn distances_squared(&self, p: Vec3) -> Vec4 {
-        let p = p.to_array().map(Vec4::splat);
+        let p = minus(p.to_array().map(Vec4::splat), self.a);
         let (b, c) = (self.b, self.c);
         let edges = past_edge(p, b, self.per_bb).min(past_edge(p, c, self.per_cc)).min(past_edge(
             minus(p, b),
