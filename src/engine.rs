@@ -106,16 +106,18 @@ pub struct FrameReport {
 #[derive(Clone, Copy, PartialEq)]
 struct Pending {
     node: NodeId,
-    /// Whether the entry below waits for this one: a dependency, not something that a view wants.
+    /// Whether an entry below waits for this one: a dependency, not something that a view wants.
     needed: bool,
+    /// Whether this entry waits for those above.
+    waits: bool,
 }
 
 impl Pending {
     fn wanted(node: NodeId) -> Self {
-        Self { node, needed: false }
+        Self { node, needed: false, waits: false }
     }
     fn needed(node: NodeId) -> Self {
-        Self { node, needed: true }
+        Self { node, needed: true, waits: false }
     }
 }
 
@@ -125,7 +127,6 @@ struct Counts {
     unfolds: u64,
     folds: u64,
     forced: u64,
-    misses: u64,
 }
 
 /// A front through a hierarchy of backend `T`, reporting the displayed mesh to `M`.
@@ -143,6 +144,8 @@ pub struct Engine<T, M> {
     kappa: f64,
     flips: Flips,
     stack: Vec<Pending>,
+    missing: Vec<NodeId>,
+    still_needed: Vec<NodeId>,
     arrived: Vec<NodeId>,
     drawing_time: Duration,
 }
@@ -182,6 +185,8 @@ impl<T: VertexTree, M: MeshSink> Engine<T, M> {
             kappa: 0.0,
             flips: Flips::default(),
             stack: Vec::new(),
+            missing: Vec::new(),
+            still_needed: Vec::new(),
             arrived: Vec::new(),
             drawing_time: Duration::ZERO,
         })
@@ -240,12 +245,12 @@ impl<T: VertexTree, M: MeshSink> Engine<T, M> {
     /// What the backend reports; the front then is a valid one between the old and the new.
     pub fn advance(&mut self, views: &[View]) -> Result<FrameReport, TreeError> {
         let start = Instant::now();
+        self.arrived.clear();
+        self.tree.begin_frame(&mut self.arrived)?;
+
         std::mem::swap(&mut self.before, &mut self.views);
         self.views.clear();
         self.views.extend(views.iter().map(|view| view.coarser(self.steering.factor)));
-
-        self.arrived.clear();
-        self.tree.begin_frame(&mut self.arrived)?;
 
         // While a budget steers, `k` has a speed. It is declared anew when the tolerance has moved far from where it
         // was declared; bounds that were computed with another speed do not hold then.
@@ -274,30 +279,29 @@ impl<T: VertexTree, M: MeshSink> Engine<T, M> {
             finder: &mut self.finder,
             frame: &frame,
             stack: &mut self.stack,
+            missing: &mut self.missing,
+            still_needed: &mut self.still_needed,
             counts: Counts::default(),
             tests: 0,
         };
-        for nodes in self.flips.fold.chunks(PREPARED) {
-            step.prepare(nodes);
-            for &node in nodes {
-                step.fold(node)?;
-            }
-        }
-        for nodes in self.flips.unfold.chunks(PREPARED) {
-            step.prepare(nodes);
-            for &node in nodes {
-                step.unfold(node)?;
-            }
+        step.missing.clear();
+        let applied = step.apply(&self.flips);
+        if applied.is_err() {
+            step.abandon(&self.flips);
         }
         let (counts, tests) = (step.counts, self.flips.tests + step.tests);
+        self.missing.sort_unstable();
+        self.missing.dedup();
+        let misses = self.missing.len() as u64;
         let apply = found.elapsed();
         self.finder.settle(&frame);
+        applied?;
         let pages = self.tree.end_frame()?;
         let select = start.elapsed();
 
         let triangles = self.tree.displayed_triangles();
         let limit = match self.steering.budget() {
-            _ if counts.misses > 0 => Limit::Io,
+            _ if misses > 0 => Limit::Io,
             Budget::Triangles(_) if self.steering.limits() => Limit::Triangles,
             Budget::FrameTime(_) if self.steering.limits() => Limit::Time,
             _ => Limit::Error,
@@ -312,7 +316,7 @@ impl<T: VertexTree, M: MeshSink> Engine<T, M> {
             unfolds: counts.unfolds,
             folds: counts.folds,
             forced: counts.forced,
-            misses: counts.misses,
+            misses,
             active_nodes: self.front.active_nodes() as u64,
             triangles,
             cut_hash: self.front.cut_hash(),
@@ -334,11 +338,61 @@ struct Steps<'a, T, M> {
     finder: &'a mut Finder,
     frame: &'a Frame<'a>,
     stack: &'a mut Vec<Pending>,
+    /// Nodes whose change was refused for want of a page; some more than once.
+    missing: &'a mut Vec<NodeId>,
+    /// Nodes that no view wants and that something else still needs.
+    still_needed: &'a mut Vec<NodeId>,
     counts: Counts,
     tests: u64,
 }
 
 impl<T: VertexTree, M: MeshSink> Steps<'_, T, M> {
+    /// Folds, then unfolds, and whatever follows.
+    fn apply(&mut self, flips: &Flips) -> Result<(), TreeError> {
+        for nodes in flips.fold.chunks(PREPARED) {
+            self.prepare(nodes);
+            for &node in nodes {
+                self.fold(node)?;
+            }
+        }
+        for nodes in flips.unfold.chunks(PREPARED) {
+            self.prepare(nodes);
+            for &node in nodes {
+                self.unfold(node)?;
+            }
+        }
+        // What was needed when its turn came may have been let go since.
+        let mut before = None;
+        while !self.still_needed.is_empty() && before != Some(self.counts.folds) {
+            before = Some(self.counts.folds);
+            for at in 0..self.still_needed.len() {
+                self.fold(self.still_needed[at])?;
+            }
+            let front = &*self.front;
+            self.still_needed.sort_unstable();
+            self.still_needed.dedup();
+            self.still_needed.retain(|&node| front.is_collapsible(node));
+        }
+        while let Some(node) = self.still_needed.pop() {
+            self.refused(node, Kind::Fold);
+        }
+        Ok(())
+    }
+
+    /// The backend can not go on: whatever was to change is to be looked at again when it can.
+    fn abandon(&mut self, flips: &Flips) {
+        let pending = self.stack.drain(..).map(|pending| pending.node);
+        let mut nodes: Vec<NodeId> = pending.chain(self.still_needed.drain(..)).collect();
+        nodes.extend(flips.fold.iter().chain(&flips.unfold));
+        for node in nodes {
+            if self.front.is_collapsible(node) {
+                self.refused(node, Kind::Fold);
+            } else if self.front.is_boundary(node) {
+                self.refused(node, Kind::Unfold);
+            }
+        }
+    }
+
     fn prepare(&self, nodes: &[NodeId]) {
         self.front.prepare(nodes);
         self.tree.prepare(nodes);
@@ -361,19 +415,22 @@ impl<T: VertexTree, M: MeshSink> Steps<'_, T, M> {
     /// Folds a collapsible node that no view wants, then as many of its ancestors as follow.
     fn fold(&mut self, node: NodeId) -> Result<(), TreeError> {
         self.stack.push(Pending::wanted(node));
-        while let Some(Pending { node, .. }) = self.stack.pop() {
+        while let Some(&Pending { node, .. }) = self.stack.last() {
             if !self.front.is_collapsible(node) {
+                self.stack.pop();
                 continue;
             }
-            match self.tree.fold(node, self.mesh)? {
+            let step = self.tree.fold(node, self.mesh)?;
+            self.stack.pop();
+            match step {
                 Step::Done => {}
                 Step::NotResident => {
-                    self.counts.misses += 1;
+                    self.missing.push(node);
                     self.refused(node, Kind::Fold);
                     continue;
                 }
                 Step::StillNeeded | Step::Needs(_) => {
-                    self.refused(node, Kind::Fold);
+                    self.still_needed.push(node);
                     continue;
                 }
             }
@@ -404,27 +461,34 @@ impl<T: VertexTree, M: MeshSink> Steps<'_, T, M> {
     /// any of them what the backend says it needs.
     fn unfold(&mut self, node: NodeId) -> Result<(), TreeError> {
         self.stack.push(Pending::wanted(node));
-        while let Some(&Pending { node, needed }) = self.stack.last() {
+        while let Some(&Pending { node, needed, .. }) = self.stack.last() {
             if self.front.is_active(node) {
                 self.stack.pop();
                 continue;
             }
-            let above = self.stack.len();
-            self.stack
-                .extend(self.tree.parents(node).filter(|&p| !self.front.is_active(p)).map(Pending::needed));
-            if self.stack.len() > above {
+            if !self.front.is_boundary(node) {
                 // A needed node below folded ones: its ancestors come first.
+                let above = self.stack.len();
+                let (front, parents) = (&*self.front, self.tree.parents(node));
+                self.stack.extend(parents.filter(|&p| !front.is_active(p)).map(Pending::needed));
+                if (above..self.stack.len()).any(|at| self.waits(self.stack[at].node)) {
+                    self.give_up();
+                } else {
+                    self.stack[above - 1].waits = true;
+                }
                 continue;
             }
             match self.tree.unfold(node, self.mesh)? {
                 Step::Done => {}
-                // Waiting for itself, by way of others, can only come from a damaged store.
-                Step::Needs(other) if self.stack.iter().all(|pending| pending.node != other) => {
+                Step::Needs(other) if !self.front.is_active(other) && !self.waits(other) => {
+                    if let Some(pending) = self.stack.last_mut() {
+                        pending.waits = true;
+                    }
                     self.stack.push(Pending::needed(other));
                     continue;
                 }
                 Step::Needs(_) | Step::NotResident | Step::StillNeeded => {
-                    self.counts.misses += 1;
+                    self.missing.push(node);
                     self.give_up();
                     continue;
                 }
@@ -445,8 +509,7 @@ impl<T: VertexTree, M: MeshSink> Steps<'_, T, M> {
             let above = self.stack.len();
             self.stack.extend(self.tree.children(node).map(Pending::wanted));
             self.retain_above(above, |steps, child| {
-                let is_boundary = T::IS_TREE || steps.front.is_boundary(&*steps.tree, child);
-                if !is_boundary {
+                if !T::IS_TREE && !steps.front.is_boundary(child) {
                     return false;
                 }
                 let wanted = steps.wanted(child);
@@ -473,10 +536,18 @@ impl<T: VertexTree, M: MeshSink> Steps<'_, T, M> {
         self.stack.truncate(kept);
     }
 
+    /// Whether a node waits for the one on top of the stack, directly or by way of others. To need it then is a cycle
+    /// of dependencies, which can only come from a damaged store.
+    fn waits(&self, node: NodeId) -> bool {
+        // What lies below an entry that nobody needs only waits for its turn.
+        let last = self.stack.iter().rposition(|pending| !pending.needed).unwrap_or(0);
+        self.stack[last..].iter().any(|pending| pending.waits && pending.node == node)
+    }
+
     /// The node on top of the stack can not be unfolded in this frame, and with it nothing that waits for it.
     fn give_up(&mut self) {
-        while let Some(Pending { node, needed }) = self.stack.pop() {
-            if self.front.is_boundary(&*self.tree, node) {
+        while let Some(Pending { node, needed, .. }) = self.stack.pop() {
+            if self.front.is_boundary(node) {
                 self.refused(node, Kind::Unfold);
             }
             if !needed {

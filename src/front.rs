@@ -1,7 +1,7 @@
 //! The active front: which nodes are unfolded, and the compact record that is kept of each node in play.
 //!
-//! A node is *in play* while all its structural parents are active (or it is a root): active nodes and boundary
-//! nodes. For these the front keeps sphere and error, and the links that a top-down traversal follows, in records that
+//! A node is *in play* while its first structural parent is active (or it is a root): active nodes and boundary nodes,
+//! and where nodes have several parents, also those that wait for another of them. For these the front keeps sphere and error, and the links that a top-down traversal follows, in records that
 //! come and go with them. The records of two siblings share a cache line, and all of them lie together however sparse
 //! the nodes in play are among all nodes: what a frame reads fits the caches if the front does, not the hierarchy.
 
@@ -18,7 +18,8 @@ pub(crate) struct Record {
     /// While active: the pair of the children linked below the node, 0 for none. With [`MANY`], an index into
     /// [`Front::many`] instead.
     children: u32,
-    /// [`ACTIVE`], [`MANY`], and how many structural children are active.
+    /// [`ACTIVE`], [`MANY`], and in the other bits, of an active node, how many structural children are active, of a
+    /// folded one, how many structural parents are not: a boundary node has none.
     status: u32,
 }
 
@@ -37,7 +38,12 @@ impl Record {
 
     #[inline(always)]
     pub fn is_collapsible(&self) -> bool {
-        self.status & (ACTIVE | ACTIVE_CHILDREN) == ACTIVE
+        self.status & (ACTIVE | COUNT) == ACTIVE
+    }
+
+    #[inline(always)]
+    pub fn is_boundary(&self) -> bool {
+        self.status & (ACTIVE | COUNT) == 0
     }
 }
 
@@ -48,7 +54,7 @@ pub(crate) struct Pair(pub [Record; 2]);
 
 const ACTIVE: u32 = 1 << 31;
 const MANY: u32 = 1 << 30;
-const ACTIVE_CHILDREN: u32 = MANY - 1;
+const COUNT: u32 = MANY - 1;
 
 /// The nodes in play.
 pub struct Front {
@@ -69,7 +75,8 @@ impl Front {
     pub(crate) fn new(node_limit: u32) -> Self {
         Self {
             slots: vec![0; node_limit as usize],
-            pairs: vec![Pair([Record::BLANK; 2])],
+            // Nodes that are not in play are no boundary nodes.
+            pairs: vec![Pair([Record { status: 1, ..Record::BLANK }; 2])],
             free: Vec::new(),
             many: Slab::new(),
             roots: Vec::new(),
@@ -107,8 +114,8 @@ impl Front {
     /// Whether the node is folded and can be unfolded next: all its structural parents are active.
     #[inline]
     #[must_use]
-    pub fn is_boundary<T: VertexTree>(&self, tree: &T, node: NodeId) -> bool {
-        !self.is_active(node) && tree.parents(node).all(|p| self.is_active(p))
+    pub fn is_boundary(&self, node: NodeId) -> bool {
+        self.record(node).is_boundary()
     }
 
     /// Reads what changing these nodes will read, for all of them at once: see [`VertexTree::prepare`].
@@ -215,6 +222,16 @@ impl Front {
             children = self.many.insert(pairs) as u32 + 1;
         }
         drop(linked);
+        if !T::IS_TREE {
+            for child in tree.children(node) {
+                if tree.parents(child).next() == Some(node) {
+                    let waits_for = |p: &NodeId| *p != node && !self.is_active(*p);
+                    self.record_mut(child).status = tree.parents(child).filter(waits_for).count() as u32;
+                } else if self.slots[child.index()] != 0 {
+                    self.record_mut(child).status -= 1;
+                }
+            }
+        }
         let record = self.record_mut(node);
         record.status = status;
         record.children = children;
@@ -237,6 +254,14 @@ impl Front {
             }
         } else if children != 0 {
             self.remove_pair(children);
+        }
+        if !T::IS_TREE {
+            // What is still in play is linked below another parent, and waits for this one again.
+            for child in tree.children(node) {
+                if self.slots[child.index()] != 0 {
+                    self.record_mut(child).status += 1;
+                }
+            }
         }
         for parent in tree.parents(node) {
             self.record_mut(parent).status -= 1;

@@ -40,7 +40,9 @@ impl TopDown {
                     let (wanted, active) = (unfold(&record.bounds), record.is_active());
                     if wanted != active {
                         if wanted {
-                            flips.unfold.push(record.node);
+                            if record.is_boundary() {
+                                flips.unfold.push(record.node);
+                            }
                         } else if record.is_collapsible() {
                             // The rest of a subtree that has to go follows from its lowest nodes upwards.
                             flips.fold.push(record.node);

@@ -111,13 +111,11 @@ fn assert_exact(needing: usize) -> (u64, u64, u64) {
 }
 
 #[test]
-#[ignore = "the engine does not hold this yet"]
 fn a_node_may_have_several_parents() {
     assert_eq!(assert_exact(0), (0, 0, 0), "nothing is needed beyond structure");
 }
 
 #[test]
-#[ignore = "the engine does not hold this yet"]
 fn what_a_node_needs_is_forced_and_folds_when_nothing_needs_it() {
     let (forced, named, still_needed) = assert_exact(30);
     assert!(forced > 1000 && named > 1000 && still_needed > 100, "{forced}, {named}, {still_needed}");
@@ -125,7 +123,6 @@ fn what_a_node_needs_is_forced_and_folds_when_nothing_needs_it() {
 
 /// Pages come late. The cut may lag behind, but not after a rest, and nothing that was refused is forgotten.
 #[test]
-#[ignore = "the engine does not hold this yet"]
 fn pages_that_come_late_are_waited_for_and_counted() {
     for (needing, missing) in [(0, 10), (0, 60), (20, 10), (20, 60)] {
         let paging = Paging { missing, latency: 4 };
@@ -204,19 +201,16 @@ fn assert_recovers(call: Call, needing: usize) {
 }
 
 #[test]
-#[ignore = "the engine does not hold this yet"]
 fn a_store_that_fails_at_the_start_of_a_frame_costs_nothing_but_time() {
     assert_recovers(Call::Begin, 0);
 }
 
 #[test]
-#[ignore = "the engine does not hold this yet"]
 fn a_store_that_fails_at_a_change_costs_nothing_but_time() {
     assert_recovers(Call::Change, 0);
 }
 
 #[test]
-#[ignore = "the engine does not hold this yet"]
 fn a_store_that_fails_at_the_end_of_a_frame_costs_nothing_but_time() {
     assert_recovers(Call::End, 0);
 }
