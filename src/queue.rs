@@ -18,7 +18,7 @@
 //! Events of the tick that a clock is in come up at every advance until that tick has passed: their deadline may
 //! lie anywhere in it.
 
-use vertex_tree::{Bounds, NodeId};
+use vertex_tree::{Bounds, NONE, NodeId};
 
 /// Ticks in a frame at full speed. A camera far below full speed still has ticks that are finer than its frames.
 pub const TICKS_PER_FRAME: f64 = 512.0;
@@ -66,11 +66,79 @@ impl Event {
     }
 }
 
+/// Events in a chunk.
+const CHUNK: usize = 15;
+
+/// Part of a bucket: 512 bytes.
+#[derive(Clone, Copy, Debug)]
+#[repr(C)]
+struct Chunk {
+    events: [Event; CHUNK],
+    len: u32,
+    /// The next chunk of the bucket, or of the free ones; [`NONE`] after the last.
+    next: u32,
+}
+
+/// Where all buckets keep their events. Chunks are used again last in, first out: what is written next was read just
+/// before and is in the nearest cache, and once there are enough of them nothing is allocated any more.
+#[derive(Debug)]
+struct Pool {
+    chunks: Vec<Chunk>,
+    free: u32,
+}
+
+impl Pool {
+    /// Appends an event to the bucket whose newest chunk is `bucket`.
+    #[inline(always)]
+    fn push(&mut self, bucket: &mut u32, event: Event) {
+        if let Some(chunk) = self.chunks.get_mut(*bucket as usize)
+            && let Some(place) = chunk.events.get_mut(chunk.len as usize)
+        {
+            *place = event;
+            chunk.len += 1;
+        } else {
+            self.push_chunk(bucket, event);
+        }
+    }
+
+    fn push_chunk(&mut self, bucket: &mut u32, event: Event) {
+        let new = self.free;
+        if let Some(chunk) = self.chunks.get_mut(new as usize) {
+            self.free = std::mem::replace(&mut chunk.next, *bucket);
+            chunk.events[0] = event;
+            chunk.len = 1;
+            *bucket = new;
+        } else {
+            self.chunks.push(Chunk { events: [event; CHUNK], len: 1, next: *bucket });
+            *bucket = self.chunks.len() as u32 - 1;
+        }
+    }
+
+    /// Moves the events of a bucket for which `keep` says so to `due`, and empties it. Returns how many there were.
+    #[inline(always)]
+    fn take(&mut self, bucket: &mut u32, due: &mut Vec<Event>, keep: impl Fn(&Event) -> bool) -> usize {
+        let mut count = 0;
+        while let Some(chunk) = self.chunks.get_mut(*bucket as usize) {
+            let events = &chunk.events[..chunk.len as usize];
+            count += events.len();
+            due.reserve(events.len());
+            for event in events {
+                if keep(event) {
+                    due.push(*event);
+                }
+            }
+            let next = std::mem::replace(&mut chunk.next, self.free);
+            self.free = std::mem::replace(bucket, next);
+        }
+        count
+    }
+}
+
 /// Buckets of events on one clock.
 #[derive(Debug)]
 struct Wheel {
-    /// `levels[l][s]` holds the events whose deadline tick, divided by `2^l`, is `s` modulo 16.
-    levels: Vec<[Vec<Event>; SLOTS as usize]>,
+    /// `levels[l][s]` is the newest chunk of the events whose deadline tick, divided by `2^l`, is `s` modulo 16.
+    levels: [[u32; SLOTS as usize]; LEVELS],
     /// For each level, a bit for each slot that may hold events.
     occupied: [u16; LEVELS],
     /// The tick that the clock is in.
@@ -79,15 +147,11 @@ struct Wheel {
 
 impl Wheel {
     fn new() -> Self {
-        Self {
-            levels: (0..LEVELS).map(|_| std::array::from_fn(|_| Vec::new())).collect(),
-            occupied: [0; LEVELS],
-            tick: 0,
-        }
+        Self { levels: [[NONE; SLOTS as usize]; LEVELS], occupied: [0; LEVELS], tick: 0 }
     }
 
     #[inline(always)]
-    fn push(&mut self, now: f64, frames: f64, event: Event) {
+    fn push(&mut self, pool: &mut Pool, now: f64, frames: f64, event: Event) {
         // Rounded down; `as` saturates, so that a bound of infinity is as late as can be.
         let deadline = ((now + frames).next_down() * TICKS_PER_FRAME) as u64;
         let ahead = deadline.saturating_sub(self.tick);
@@ -101,11 +165,11 @@ impl Wheel {
         level += usize::from((deadline >> level) - (self.tick >> level) >= SLOTS);
         let slot = ((deadline >> level) % SLOTS) as usize;
         self.occupied[level] |= 1 << slot;
-        self.levels[level][slot].push(event);
+        pool.push(&mut self.levels[level][slot], event);
     }
 
     /// Calls `take` with each bucket that the clock reaches on its way to `now`.
-    fn advance(&mut self, now: f64, mut take: impl FnMut(&mut Vec<Event>)) {
+    fn advance(&mut self, now: f64, take: &mut dyn FnMut(&mut u32)) {
         let before = self.tick;
         let after = (now * TICKS_PER_FRAME) as u64;
         debug_assert!(after >= before, "the clock went back from tick {before} to {after}");
@@ -122,12 +186,12 @@ impl Wheel {
                 continue;
             }
             for slot in first..=last.min(first + SLOTS - 1) {
-                self.take(level, (slot % SLOTS) as usize, &mut take);
+                self.take(level, (slot % SLOTS) as usize, take);
             }
         }
     }
 
-    fn take(&mut self, level: usize, slot: usize, take: &mut impl FnMut(&mut Vec<Event>)) {
+    fn take(&mut self, level: usize, slot: usize, take: &mut dyn FnMut(&mut u32)) {
         if self.occupied[level] >> slot & 1 == 1 {
             self.occupied[level] &= !(1 << slot);
             take(&mut self.levels[level][slot]);
@@ -139,8 +203,11 @@ impl Wheel {
 #[derive(Debug)]
 pub struct EventQueue {
     wheels: Vec<Wheel>,
+    pool: Pool,
     /// Events to return at every advance.
-    pressing: Vec<Event>,
+    pressing: u32,
+    /// Kept between sweeps for its allocation.
+    swept: Vec<Event>,
     tickets: Vec<u8>,
     /// Events in the buckets, cancelled ones included.
     stored: usize,
@@ -154,7 +221,9 @@ impl EventQueue {
     pub fn new(node_limit: u32, clocks: usize) -> Self {
         Self {
             wheels: (0..clocks).map(|_| Wheel::new()).collect(),
-            pressing: Vec::new(),
+            pool: Pool { chunks: Vec::new(), free: NONE },
+            pressing: NONE,
+            swept: Vec::new(),
             tickets: vec![0; node_limit as usize],
             stored: 0,
             cancelled: 0,
@@ -194,14 +263,14 @@ impl EventQueue {
     #[inline(always)]
     pub fn schedule(&mut self, clock: usize, now: f64, frames: f64, event: Event) {
         self.stored += 1;
-        self.wheels[clock].push(now, frames, event);
+        self.wheels[clock].push(&mut self.pool, now, frames, event);
     }
 
     /// Schedules an event for the next advance of any clock and every advance after it, moved or not, until it is
     /// cancelled by a status change or comes up: for a change that was refused and is still wanted.
     pub fn press(&mut self, event: Event) {
         self.stored += 1;
-        self.pressing.push(event);
+        self.pool.push(&mut self.pressing, event);
     }
 
     /// Cancels whatever is scheduled for `node`.
@@ -220,38 +289,40 @@ impl EventQueue {
 
     #[cold]
     fn sweep(&mut self) {
-        let tickets = &self.tickets;
+        let Self { wheels, pool, pressing, swept, tickets, .. } = self;
         self.stored = 0;
-        let buckets = self.wheels.iter_mut().flat_map(|wheel| wheel.levels.iter_mut().flatten());
-        for bucket in buckets.chain([&mut self.pressing]) {
-            bucket.retain(|event| tickets[event.node.index()] == event.ticket());
-            self.stored += bucket.len();
+        let buckets = wheels.iter_mut().flat_map(|wheel| wheel.levels.as_flattened_mut());
+        for bucket in buckets.chain([pressing]) {
+            swept.clear();
+            pool.take(bucket, swept, |event| tickets[event.node.index()] == event.ticket());
+            swept.iter().for_each(|&event| pool.push(bucket, event));
+            self.stored += swept.len();
         }
         self.cancelled = 0;
     }
 
     /// Appends the pressing events to `due`, removing them.
     pub fn take_pressing(&mut self, due: &mut Vec<Event>) {
-        drain(&mut self.pressing, &self.tickets, &mut self.stored, &mut self.cancelled, due);
+        let mut pressing = std::mem::replace(&mut self.pressing, NONE);
+        self.with_wheels(due, |_, take| take(&mut pressing));
     }
 
     /// Moves a clock to `now` and appends to `due` every event on it that must be tested by then, removing it, and
     /// whatever is pressing.
     pub fn advance(&mut self, clock: usize, now: f64, due: &mut Vec<Event>) {
         self.take_pressing(due);
-        let Self { wheels, tickets, stored, cancelled, .. } = self;
-        wheels[clock].advance(now, |bucket| drain(bucket, tickets, stored, cancelled, due));
+        self.with_wheels(due, |wheels, take| wheels[clock].advance(now, take));
     }
 
     /// Appends every event on one clock to `due`, removing it: for a motion that its speeds do not cover.
     pub fn take_clock(&mut self, clock: usize, due: &mut Vec<Event>) {
-        let Self { wheels, tickets, stored, cancelled, .. } = self;
-        let wheel = &mut wheels[clock];
-        for level in 0..LEVELS {
-            for slot in 0..SLOTS as usize {
-                wheel.take(level, slot, &mut |bucket| drain(bucket, tickets, stored, cancelled, due));
+        self.with_wheels(due, |wheels, take| {
+            for level in 0..LEVELS {
+                for slot in 0..SLOTS as usize {
+                    wheels[clock].take(level, slot, take);
+                }
             }
-        }
+        });
     }
 
     /// Appends every event to `due`, removing it: for a motion that no declared speed covers.
@@ -262,24 +333,16 @@ impl EventQueue {
         }
         self.cancelled = 0;
     }
-}
 
-/// Moves the events of a bucket that are still valid to `due`. The bucket keeps its allocation.
-fn drain(
-    bucket: &mut Vec<Event>,
-    tickets: &[u8],
-    stored: &mut usize,
-    cancelled: &mut usize,
-    due: &mut Vec<Event>,
-) {
-    *stored -= bucket.len();
-    let before = due.len();
-    due.reserve(bucket.len());
-    for event in &*bucket {
-        if tickets[event.node.index()] == event.ticket() {
-            due.push(*event);
-        }
+    /// Calls `f` with the wheels and with what moves the valid events of a bucket to `due`.
+    #[inline(always)]
+    fn with_wheels(&mut self, due: &mut Vec<Event>, f: impl FnOnce(&mut [Wheel], &mut dyn FnMut(&mut u32))) {
+        let Self { wheels, pool, tickets, stored, cancelled, .. } = self;
+        f(wheels, &mut |bucket| {
+            let before = due.len();
+            let taken = pool.take(bucket, due, |event| tickets[event.node.index()] == event.ticket());
+            *stored -= taken;
+            *cancelled = cancelled.saturating_sub(taken - (due.len() - before));
+        });
     }
-    *cancelled = cancelled.saturating_sub(bucket.len() - (due.len() - before));
-    bucket.clear();
 }
