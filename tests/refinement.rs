@@ -86,11 +86,11 @@ fn everything_unfolds_and_folds(name: &str, input: &Mesh) {
     assert_same(&shown(&log, &hierarchy, &mesh), &base, &format!("{name}, all folded"));
     assert_eq!(tree.displayed_triangles(), base_triangles as u64);
 
-    a_walk_shows_what_the_log_says(name, &log, hierarchy);
+    a_walk_shows_what_the_log_says(name, &log, &hierarchy);
 }
 
 /// Random views from around a mesh: slow steps and teleports.
-fn a_walk_shows_what_the_log_says(name: &str, log: &CollapseLog, hierarchy: Arc<Hierarchy>) {
+fn a_walk_shows_what_the_log_says(name: &str, log: &CollapseLog, hierarchy: &Arc<Hierarchy>) {
     let (lo, hi) = log.mesh.bounding_box().unwrap();
     let [lo, hi] = [lo, hi].map(|p| DVec3::from(p.map(f64::from)));
     let (center, scale) = ((lo + hi) / 2.0, log.mesh.extent() / 2.0);
@@ -108,7 +108,7 @@ fn a_walk_shows_what_the_log_says(name: &str, log: &CollapseLog, hierarchy: Arc<
         if frame % 20 == 19 {
             let mut active = vec![false; log.collapses.len()];
             engine.for_each_active(|node| active[hierarchy.log_number(node) as usize] = true);
-            let found = shown(log, &hierarchy, engine.mesh());
+            let found = shown(log, hierarchy, engine.mesh());
             assert_same(&found, &expected(log, &active), &format!("{name}, frame {frame}"));
         }
     }
