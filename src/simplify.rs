@@ -16,7 +16,7 @@ mod virtual_edges;
 use std::time::{Duration, Instant};
 
 use glam::{DVec3, Vec3};
-use vertex_tree::{Bounds, Collapse, CollapseLog, LogError, Mesh};
+use vertex_tree::{Collapse, CollapseLog, LogError, Mesh};
 
 use crate::progress::Progress;
 use marks::Marks;
@@ -73,10 +73,9 @@ pub fn build(mesh: Mesh, options: &Options, progress: Progress) -> Result<(Colla
     log.forest()?;
     let mesh = &log.mesh;
     let extent = mesh.extent();
-    // Work in units in which the mesh is about as large as 1. A power of two changes no bit of the mantissas.
-    let largest = mesh.positions.iter().flatten().fold(0.0_f32, |m, x| m.max(x.abs()));
-    let exponent = if largest > 0.0 { f64::from(largest).log2().ceil() as i32 } else { 0 };
-    let scale = 2.0_f64.powi(exponent);
+    // Work in units in which all coordinates are below 1. A power of two changes no bit of the mantissas.
+    let largest = mesh.positions.iter().flatten().fold(0.0_f32, |largest, x| x.abs().max(largest));
+    let scale = power_of_two_above(largest);
     let scaled: Vec<Vec3> =
         mesh.positions.iter().map(|&p| (DVec3::from(p.map(f64::from)) / scale).as_vec3()).collect();
 
@@ -87,12 +86,12 @@ pub fn build(mesh: Mesh, options: &Options, progress: Progress) -> Result<(Colla
         number[old as usize] = new;
     }
     let positions: Vec<Vec3> = order.iter().map(|&old| scaled[old as usize]).collect();
-    let leaf_radius = leaf_radii(&mesh.triangles, &number, &positions);
+    let leaf_radius = leaf_radii(mesh, &number);
     let mut surface = Surface::new(positions, &coherent_triangles(&mesh.triangles, &number));
     let mut marks = Marks::new(order.len());
     set_initial_quadrics(&mut surface, &mut marks);
-    let nodes = Nodes::new(leaf_radius, extent / scale);
-    let mut builder = Builder::new(surface, nodes, marks, options.merge_components);
+    let nodes = Nodes::new(leaf_radius, extent);
+    let mut builder = Builder::new(surface, nodes, marks, options.merge_components, scale);
     let preparation = start.elapsed();
 
     let start = Instant::now();
@@ -102,18 +101,9 @@ pub fn build(mesh: Mesh, options: &Options, progress: Progress) -> Result<(Colla
     let start = Instant::now();
     let nodes = &builder.nodes;
     let (sequence, inversions) = sequence(&nodes.keys, &builder.rounds);
-    let unscaled = |x: f32| ((f64::from(x) * scale) as f32).min(f32::MAX);
     let collapses = sequence.iter().map(|&node| {
         let c = nodes.collapses[node as usize];
-        Collapse {
-            removed: order[c.removed as usize],
-            kept: order[c.kept as usize],
-            bounds: Bounds {
-                center: c.bounds.center.map(unscaled),
-                radius: unscaled(c.bounds.radius),
-                eps: unscaled(c.bounds.eps),
-            },
-        }
+        Collapse { removed: order[c.removed as usize], kept: order[c.kept as usize], ..c }
     });
     log.collapses = collapses.collect();
     let forest = log.forest()?;
@@ -156,15 +146,25 @@ fn sequence(keys: &[f32], rounds: &[u32]) -> (Vec<u32>, usize) {
 /// Weight of a plane that holds a boundary edge in place, per squared length of the edge.
 const BOUNDARY_WEIGHT: f32 = 4.0;
 
-/// For each vertex in the new numbering, its distance to the farthest corner of its triangles.
-fn leaf_radii(triangles: &[[u32; 3]], number: &[u32], positions: &[Vec3]) -> Vec<f32> {
-    let mut farthest = vec![0.0_f64; positions.len()];
-    for triangle in triangles {
-        let [a, b, c] = triangle.map(|v| number[v as usize] as usize);
+/// The least power of two that is above `x`, which is not negative; 1 for 0.
+fn power_of_two_above(x: f32) -> f64 {
+    const EXPONENT: u64 = 0x7ff << 52;
+    // Every single-precision number but 0 has an exponent of its own in double precision.
+    let power = f64::from_bits(f64::from(x).to_bits() & EXPONENT);
+    if x > 0.0 { 2.0 * power } else { 1.0 }
+}
+
+/// For each vertex in the new numbering, its distance to the farthest corner of its triangles, in object units.
+fn leaf_radii(mesh: &Mesh, number: &[u32]) -> Vec<f32> {
+    let mut farthest = vec![0.0_f64; number.len()];
+    let position = |v: u32| DVec3::from(mesh.positions[v as usize].map(f64::from));
+    for &[a, b, c] in &mesh.triangles {
         for (v, w) in [(a, b), (b, c), (c, a)] {
-            let squared = positions[v].as_dvec3().distance_squared(positions[w].as_dvec3());
-            farthest[v] = farthest[v].max(squared);
-            farthest[w] = farthest[w].max(squared);
+            let squared = position(v).distance_squared(position(w));
+            for v in [v, w] {
+                let farthest = &mut farthest[number[v as usize] as usize];
+                *farthest = squared.max(*farthest);
+            }
         }
     }
     farthest.into_iter().map(|squared| round_up(squared.sqrt() * (1.0 + 1e-15))).collect()

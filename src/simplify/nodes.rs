@@ -33,7 +33,7 @@ const RELATIVE_SLACK: f64 = 1.0 / (1 << 19) as f64;
 /// And by this part of the extent of the mesh.
 const ABSOLUTE_SLACK: f64 = 1.0 / (1_u64 << 40) as f64;
 
-/// The nodes made so far.
+/// The nodes made so far, in object units.
 #[derive(Debug)]
 pub(super) struct Nodes {
     pub collapses: Vec<Collapse>,
@@ -73,7 +73,7 @@ impl Nodes {
         self.collapses.len() as u32
     }
 
-    /// Makes the node of a collapse. `creators` are the collapses that last changed the triangles around `removed`,
+    /// Makes the node of a collapse, unless its sphere is too large for single precision, and says whether it has. `creators` are the collapses that last changed the triangles around `removed`,
     /// `NONE` for untouched ones; `bereaved` are the vertices that lose a triangle and get none; `positions` are those of
     /// the two vertices.
     pub fn add(
@@ -84,7 +84,7 @@ impl Nodes {
         bereaved: &[u32],
         error: f32,
         key: f32,
-    ) {
+    ) -> bool {
         self.predecessors.clear();
         self.balls.clear();
         for (v, center) in [removed, kept].into_iter().zip(positions) {
@@ -109,6 +109,9 @@ impl Nodes {
         let center = enclosing_center(&mut self.balls).as_vec3();
         let radius = radius_around(center.as_dvec3(), &self.balls);
         let radius = round_up((radius + self.slack) * (1.0 + RELATIVE_SLACK));
+        if !(radius.is_finite() && eps.is_finite()) {
+            return false;
+        }
         self.top[kept as usize] = self.next();
         for &v in bereaved {
             self.trace[v as usize] = self.next();
@@ -120,6 +123,7 @@ impl Nodes {
         });
         self.depth.push(depth + 1);
         self.keys.push(key);
+        true
     }
 }
 

@@ -51,10 +51,12 @@ pub(super) struct Builder {
     others: Vec<u32>,
     /// Whether to join components.
     merge: bool,
+    /// Length of a unit of the simplification in object units.
+    scale: f64,
 }
 
 impl Builder {
-    pub fn new(surface: Surface, nodes: Nodes, marks: Marks, merge: bool) -> Builder {
+    pub fn new(surface: Surface, nodes: Nodes, marks: Marks, merge: bool, scale: f64) -> Builder {
         let count = surface.positions.len();
         Builder {
             surface,
@@ -67,6 +69,7 @@ impl Builder {
             bereaved: Vec::new(),
             others: Vec::new(),
             merge,
+            scale,
         }
     }
 
@@ -230,8 +233,12 @@ impl Builder {
         let node = self.nodes.next();
         let creators = self.star.iter().map(|s| surface.triangles[s.triangle as usize].creator);
         let key = self.candidates.key[v as usize];
-        let positions = [from.as_dvec3(), to.as_dvec3()];
-        self.nodes.add([v, u], positions, creators, &self.bereaved, round_up(f64::from(error)), key);
+        let positions = [from, to].map(|p| p.as_dvec3() * self.scale);
+        let eps = round_up(f64::from(error) * self.scale);
+        if !self.nodes.add([v, u], positions, creators, &self.bereaved, eps, key) {
+            self.candidates.state[v as usize] = State::Nothing;
+            return;
+        }
 
         let joined = self.star.iter().any(|s| s.touches(u));
         // Where all is regular, a legal collapse keeps it so.
