@@ -1,8 +1,7 @@
 //! Top-down traversal (Zach & Karner 2003, Figure 3): every node in play is tested, every frame.
 //!
-//! The paper recurses. Here the hierarchy is walked level by level: the nodes of a level are known before the first
-//! of them is read, so that the processor fetches several at once instead of waiting for each in turn. Siblings are
-//! visited together, as their records share a cache line.
+//! The paper's recursion, with a stack. Records lie in the order in which the front descended, which is that of this
+//! walk where nothing has changed since: memory is read in sequence.
 
 use super::{Flips, Frame};
 use crate::front::Front;
@@ -10,9 +9,8 @@ use vertex_tree::{Bounds, NONE};
 
 #[derive(Default)]
 pub(crate) struct TopDown {
-    /// Pairs of siblings to visit, by level. Kept between frames for their allocations.
-    level: Vec<u32>,
-    below: Vec<u32>,
+    /// Pairs of siblings to visit. Kept between frames for its allocation.
+    stack: Vec<u32>,
 }
 
 impl TopDown {
@@ -26,31 +24,27 @@ impl TopDown {
 
     #[inline(always)]
     fn walk(&mut self, front: &Front, flips: &mut Flips, unfold: impl Fn(&Bounds) -> bool) {
-        self.level.clear();
-        self.level.extend_from_slice(front.root_pairs());
-        while !self.level.is_empty() {
-            self.below.clear();
-            for &pair in &self.level {
-                for record in front.pair(pair) {
-                    if record.node.0 == NONE {
-                        continue;
-                    }
-                    flips.tests += 1;
-                    front.descend(record, &mut self.below);
-                    let (wanted, active) = (unfold(&record.bounds), record.is_active());
-                    if wanted != active {
-                        if wanted {
-                            if record.is_boundary() {
-                                flips.unfold.push(record.node);
-                            }
-                        } else if record.is_collapsible() {
-                            // The rest of a subtree that has to go follows from its lowest nodes upwards.
-                            flips.fold.push(record.node);
+        self.stack.clear();
+        self.stack.extend_from_slice(front.root_pairs());
+        while let Some(pair) = self.stack.pop() {
+            for record in front.pair(pair) {
+                if record.node.0 == NONE {
+                    continue;
+                }
+                flips.tests += 1;
+                front.descend(record, &mut self.stack);
+                let (wanted, active) = (unfold(&record.bounds), record.is_active());
+                if wanted != active {
+                    if wanted {
+                        if record.is_boundary() {
+                            flips.unfold.push(record.node);
                         }
+                    } else if record.is_collapsible() {
+                        // The rest of a subtree that has to go follows from its lowest nodes upwards.
+                        flips.fold.push(record.node);
                     }
                 }
             }
-            std::mem::swap(&mut self.level, &mut self.below);
         }
     }
 }
