@@ -258,7 +258,10 @@ impl Builder {
             }
             for w in [spoke.next, spoke.last] {
                 surface.special[w as usize] |= !regular;
-                self.candidates.neighbour_merged(w, v, u, surface);
+                // Most neighbours come along twice.
+                if w == spoke.next || self.candidates.state[w as usize] != State::Updated {
+                    self.candidates.neighbour_merged(w, v, u, surface);
+                }
             }
         }
         for w in surface.virtual_edges.partners(v).chain([u]) {
