@@ -4,6 +4,8 @@
 //! real meshes where the folder `shared/data` lies beside the repository; words select subjects by name. The
 //! tolerance is 1 pixel at 1080 lines; full speed is declared as the path's 99th percentile, as `compare` does.
 //!
+//! Hierarchies are kept in `target/tmp/strategies`; delete that folder after changing the construction.
+//!
 //! Every exact strategy must arrive at the same cut in every frame: the benchmark fails where two hashes differ.
 
 use std::path::PathBuf;
@@ -39,6 +41,14 @@ fn main() {
             calm_tables(&hierarchy, &calm, 1.0);
             wild_table(&hierarchy, &wild);
         }
+    }
+    // Everything in view and next to everything unfolded: what a test costs where the front leaves the caches.
+    if is_chosen("million") {
+        let scene = Scene::parse("scene:laserscan@2").expect("a scene");
+        let log = cached("million", &simplify::Options::default(), || scene.mesh(&mut |_, _| {}));
+        let mut walk = Path { name: "million".to_owned(), ..path::around(&log.mesh) };
+        walk.frames.truncate(40);
+        calm_tables(&arrange(&log), &walk, 0.003);
     }
     let data = PathBuf::from(concat!(env!("CARGO_MANIFEST_DIR"), "/../shared/data"));
     for name in ["bunny", "dragon"] {
