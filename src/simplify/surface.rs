@@ -117,18 +117,12 @@ impl Surface {
         let start = self.star_start[v as usize] as usize;
         let star = &self.incident[start..start + self.star_length[v as usize] as usize];
         star.iter().filter_map(move |&triangle| {
-            let [a, b, c] = self.triangles[triangle as usize].corners;
-            if a == v {
-                Some(Spoke { triangle, next: b, last: c })
-            } else if a == NONE {
-                None
-            } else if b == v {
-                Some(Spoke { triangle, next: c, last: a })
-            } else if c == v {
-                Some(Spoke { triangle, next: a, last: b })
-            } else {
-                None
-            }
+            let corners = self.triangles[triangle as usize].corners;
+            // At which corner `v` stands is as good as random: better looked up than branched upon.
+            let corner = usize::from(corners[1] == v) + 2 * usize::from(corners[2] == v);
+            let is_there = (corners[0] != NONE) & (corners[corner] == v);
+            let (next, last) = (corners[(corner + 1) % 3], corners[(corner + 2) % 3]);
+            is_there.then_some(Spoke { triangle, next, last })
         })
     }
 
