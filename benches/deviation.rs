@@ -7,14 +7,10 @@
 
 use std::path::PathBuf;
 
-use foldfront::budget::Budget;
 use foldfront::compare::{Options, Subject};
-use foldfront::criterion::Criterion;
 use foldfront::cut::{Displayed, uniform_cut};
 use foldfront::deviation::{Deviation, Reference};
 use foldfront::path::import::{self, Mode, import};
-use foldfront::refine::Strategy;
-use foldfront::view::theta_of_pixels;
 use foldfront::{mesh_io, simplify};
 
 const LINES: u32 = 1080;
@@ -54,15 +50,7 @@ fn main() {
         let forest = log.forest().expect("the log was just built");
         let subject = Subject::new(name, &log).expect("the log was just built");
         let reference = Reference::new(&log.mesh);
-        let options = Options {
-            strategies: vec![Strategy::TopDown],
-            criterion: Criterion::ScreenError,
-            theta: theta_of_pixels(1.0, LINES),
-            budget: Budget::None,
-            rho: None,
-            omega: None,
-            check: false,
-        };
+        let options = Options::default();
         for n in 0..FRAMES {
             let frame = (2 * n + 1) * path.frames.len() / (2 * FRAMES);
             let camera = path.camera(frame);

@@ -7,16 +7,13 @@
 
 use std::path::PathBuf;
 
-use foldfront::budget::Budget;
 use foldfront::compare::{Options, Subject};
 use foldfront::criterion::Criterion;
 use foldfront::output;
 use foldfront::path;
-use foldfront::refine::Strategy;
 use foldfront::report::{Report, Section};
 use foldfront::scene::{Scene, SceneKind};
 use foldfront::simplify;
-use foldfront::view::theta_of_pixels;
 
 fn main() {
     let folder = PathBuf::from(env!("CARGO_TARGET_TMPDIR")).join("../selection_time");
@@ -28,15 +25,7 @@ fn main() {
         build.merge_components = scene.is_many_objects();
         let (log, _) = simplify::build(scene.mesh(quiet), &build, quiet).expect("scenes are meshes");
         let rho = if kind == SceneKind::Alps { 50.0 } else { 1.0 };
-        let ours = Options {
-            strategies: Strategy::ALL.to_vec(),
-            criterion: Criterion::ScreenError,
-            theta: theta_of_pixels(1.0, 1080),
-            budget: Budget::None,
-            rho: None,
-            omega: None,
-            check: false,
-        };
+        let ours = Options::default();
         let papers = Options {
             criterion: Criterion::SphereSize,
             theta: 0.02,

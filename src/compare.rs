@@ -22,7 +22,7 @@ use crate::oracle::{Difference, Oracle};
 use crate::path::Path;
 use crate::progress::Progress;
 use crate::refine::Strategy;
-use crate::view::View;
+use crate::view::{View, theta_of_pixels};
 
 /// What to replay, and how.
 #[derive(Clone, Debug, PartialEq)]
@@ -41,6 +41,21 @@ pub struct Options {
     pub omega: Option<f64>,
     /// Compare every frame of every exact strategy with the oracle.
     pub check: bool,
+}
+
+impl Default for Options {
+    /// Every strategy, screen error of 1 pixel at 1080 lines, no budget, speeds of the path, no check.
+    fn default() -> Self {
+        Self {
+            strategies: Strategy::ALL.to_vec(),
+            criterion: Criterion::default(),
+            theta: theta_of_pixels(1.0, 1080),
+            budget: Budget::None,
+            rho: None,
+            omega: None,
+            check: false,
+        }
+    }
 }
 
 /// One frame of a replay.

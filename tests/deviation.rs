@@ -4,14 +4,10 @@
 
 use std::path::{Path as FilePath, PathBuf};
 
-use foldfront::budget::Budget;
 use foldfront::compare::{Options, Subject};
-use foldfront::criterion::Criterion;
 use foldfront::cut::{Displayed, uniform_cut};
 use foldfront::deviation::Reference;
 use foldfront::path::import::{self, Mode, import};
-use foldfront::refine::Strategy;
-use foldfront::view::theta_of_pixels;
 use foldfront::{mesh_io, simplify};
 
 const LINES: u32 = 1080;
@@ -33,15 +29,7 @@ fn nominal_is_measured(mesh: &str, trajectory: &str, mode: Mode, frames: usize) 
     let forest = log.forest().unwrap();
     let subject = Subject::new("", &log).unwrap();
     let reference = Reference::new(&log.mesh);
-    let options = Options {
-        strategies: vec![Strategy::TopDown],
-        criterion: Criterion::ScreenError,
-        theta: theta_of_pixels(1.0, LINES),
-        budget: Budget::None,
-        rho: None,
-        omega: None,
-        check: false,
-    };
+    let options = Options::default();
     for n in 0..frames {
         let frame = (2 * n + 1) * path.frames.len() / (2 * frames);
         let camera = path.camera(frame);

@@ -9,24 +9,14 @@ use super::arguments::{Deviation, Export, LINES, Refinement, Render};
 use super::input::Input;
 use super::print;
 use super::progress::stage;
-use crate::budget::Budget;
 use crate::compare::{Options, Subject};
 use crate::deviation::Reference;
 use crate::path::Path;
-use crate::refine::Strategy;
 use crate::render::{self, Style};
 use crate::view::Camera;
 
 fn options(refinement: &Refinement) -> Options {
-    Options {
-        strategies: vec![Strategy::TopDown],
-        criterion: refinement.criterion.into(),
-        theta: refinement.theta(),
-        budget: Budget::None,
-        rho: None,
-        omega: None,
-        check: false,
-    }
+    Options { criterion: refinement.criterion.into(), theta: refinement.theta(), ..Options::default() }
 }
 
 fn check_frame(path: &Path, frame: usize) -> Result<()> {
