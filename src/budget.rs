@@ -15,7 +15,8 @@ pub enum Budget {
     /// No budget: the tolerance of the views stands.
     #[default]
     None,
-    /// At most this many triangles displayed.
+    /// At most this many triangles displayed: kept to while the camera rests, and within a few percent while it moves,
+    /// as the tolerance follows what the frame before cost.
     Triangles(u64),
     /// At most this long for a frame. The engine counts its own step; a renderer adds what drawing took through
     /// [`Engine::add_frame_time`](crate::engine::Engine::add_frame_time).

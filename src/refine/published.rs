@@ -12,7 +12,8 @@
 //!   maximum of the first and of the minimum of the others.
 //!
 //! What remains is the published scheme's own error: moving the eye changes `alpha` and `phi` too, which `t_r`
-//! ignores, so nodes come into view or leave it before their event is due. A node is then wrong until it is.
+//! ignores, so nodes come into view or leave it before their event is due. A node is then wrong until it is. Nor does it
+//! know of a tolerance that changes, as under a budget.
 
 use glam::DVec3;
 use vertex_tree::{Bounds, NodeId};
