@@ -247,7 +247,8 @@ fn table(hierarchy: &Arc<Hierarchy>, walk: &Path, declared: &Path, pixels: f64) 
     for round in 0..ROUNDS {
         for (&strategy, least) in EXACT.iter().zip(&mut least) {
             let settings = Settings { strategy, rho: speed.rho, omega: speed.omega, ..Settings::default() };
-            let with_mesh = replay(hierarchy, settings, &views, ActiveMesh::new, ActiveMesh::clear_changes);
+            let with_mesh =
+                replay(hierarchy, settings, &views, |_| ActiveMesh::new(), ActiveMesh::clear_changes);
             let without = replay(hierarchy, settings, &views, |_| NullSink, |_| {});
             for (least, reports) in least.iter_mut().zip([with_mesh, without]) {
                 if hashes.is_empty() {

@@ -1,72 +1,59 @@
 //! The displayed mesh as a renderer keeps it: a vertex buffer, an index buffer, and what changed in them.
 //!
-//! The index buffer is dense: its first `triangles().len()` entries are the displayed triangles, so one draw call
-//! shows them; a triangle that disappears is replaced by the last one. The vertex buffer has holes, which are used
-//! again last in, first out. Per frame a renderer uploads the entries named by [`ActiveMesh::changed_triangles`] and
+//! Both buffers are indexed by the slots that the backend hands out, so a change is a write. Slots are used again, and
+//! both buffers have holes: the index buffer holds triangles without an area there, so that one draw call over all of it
+//! shows the mesh. Per frame a renderer uploads the entries named by [`ActiveMesh::changed_triangles`] and
 //! [`ActiveMesh::changed_vertices`], then calls [`ActiveMesh::clear_changes`].
 
-use vertex_tree::{Mesh, MeshSink, NONE, TriangleId, VertexId, VertexTree};
+use vertex_tree::{Mesh, MeshSink, NONE, TriangleId, VertexId};
 
 /// A slot of one of the buffers is named at most once among the changes.
 #[derive(Clone, Debug, Default)]
 struct Changes {
     slots: Vec<u32>,
-    /// For each slot, the round in which it last changed.
-    round_of: Vec<u32>,
-    round: u32,
+    /// A bit a slot: whether it is named. Small enough to stay in the nearest cache.
+    is_named: Vec<u64>,
 }
 
 impl Changes {
+    #[inline]
     fn note(&mut self, slot: u32) {
-        if self.round_of.len() <= slot as usize {
-            self.round_of.resize(slot as usize + 1, u32::MAX);
+        let (word, bit) = (slot as usize / 64, 1 << (slot % 64));
+        if self.is_named.len() <= word {
+            self.is_named.resize(word + 1, 0);
         }
-        let round_of = &mut self.round_of[slot as usize];
-        if *round_of != self.round {
-            *round_of = self.round;
+        if self.is_named[word] & bit == 0 {
+            self.is_named[word] |= bit;
             self.slots.push(slot);
         }
     }
 
     fn clear(&mut self) {
-        self.slots.clear();
-        self.round = self.round.wrapping_add(1);
-        if self.round == u32::MAX {
-            self.round_of.fill(u32::MAX);
-            self.round = 0;
+        for slot in self.slots.drain(..) {
+            self.is_named[slot as usize / 64] = 0;
         }
     }
 }
 
+/// What stands in an unused slot of the index buffer: it covers nothing.
+const HOLE: [u32; 3] = [0; 3];
+
 /// Vertex and index buffers of the displayed mesh, patched as the front moves.
-#[derive(Clone, Debug)]
+#[derive(Clone, Debug, Default)]
 pub struct ActiveMesh {
     positions: Vec<[f32; 3]>,
-    /// The vertex in each slot, [`NONE`] in a hole.
-    vertex_in: Vec<VertexId>,
-    holes: Vec<u32>,
-    slot_of_vertex: Vec<u32>,
     triangles: Vec<[u32; 3]>,
-    triangle_in: Vec<TriangleId>,
-    slot_of_triangle: Vec<u32>,
+    displayed: usize,
+    vertices: usize,
     changed_vertices: Changes,
     changed_triangles: Changes,
 }
 
 impl ActiveMesh {
-    /// An empty mesh for what `tree` will report.
-    pub fn new(tree: &impl VertexTree) -> Self {
-        Self {
-            positions: Vec::new(),
-            vertex_in: Vec::new(),
-            holes: Vec::new(),
-            slot_of_vertex: vec![NONE; tree.vertex_count() as usize],
-            triangles: Vec::new(),
-            triangle_in: Vec::new(),
-            slot_of_triangle: vec![NONE; tree.triangle_count() as usize],
-            changed_vertices: Changes::default(),
-            changed_triangles: Changes::default(),
-        }
+    /// An empty mesh.
+    #[must_use]
+    pub fn new() -> Self {
+        Self::default()
     }
 
     /// The vertex buffer: positions in object space. Slots that no triangle names hold old positions.
@@ -75,22 +62,27 @@ impl ActiveMesh {
         &self.positions
     }
 
-    /// The index buffer: three slots of the vertex buffer a triangle, counter-clockwise.
+    /// The index buffer: three slots of the vertex buffer a triangle, counter-clockwise; three times the same in a hole.
     #[must_use]
     pub fn triangles(&self) -> &[[u32; 3]] {
         &self.triangles
     }
 
-    /// The backend's number of the triangle in each slot of the index buffer.
+    /// How many triangles are displayed: slots of the index buffer that are no holes.
     #[must_use]
-    pub fn triangle_ids(&self) -> &[TriangleId] {
-        &self.triangle_in
+    pub fn displayed(&self) -> usize {
+        self.displayed
     }
 
-    /// The backend's number of the vertex in each slot of the vertex buffer; [`NONE`] in a hole.
+    /// How many vertices are displayed: slots of the vertex buffer that are no holes.
     #[must_use]
-    pub fn vertex_ids(&self) -> &[VertexId] {
-        &self.vertex_in
+    pub fn displayed_vertices(&self) -> usize {
+        self.vertices
+    }
+
+    /// The displayed triangles, each with its slot.
+    pub fn displayed_triangles(&self) -> impl Iterator<Item = (TriangleId, [VertexId; 3])> + '_ {
+        (0..).zip(&self.triangles).filter(|(_, t)| t[0] != t[1]).map(|(slot, &t)| (slot, t))
     }
 
     /// Slots of the vertex buffer that have changed since the changes were cleared, each once.
@@ -115,61 +107,67 @@ impl ActiveMesh {
     /// A copy of the displayed mesh, without holes.
     #[must_use]
     pub fn to_mesh(&self) -> Mesh {
-        let mut slot = vec![NONE; self.positions.len()];
+        let mut number = vec![NONE; self.positions.len()];
         let mut mesh = Mesh::default();
-        for (at, &vertex) in self.vertex_in.iter().enumerate() {
-            if vertex != NONE {
-                slot[at] = mesh.positions.len() as u32;
-                mesh.positions.push(self.positions[at]);
-            }
+        for (_, corners) in self.displayed_triangles() {
+            mesh.triangles.push(corners.map(|v| {
+                let number = &mut number[v as usize];
+                if *number == NONE {
+                    *number = mesh.positions.len() as u32;
+                    mesh.positions.push(self.positions[v as usize]);
+                }
+                *number
+            }));
         }
-        mesh.triangles = self.triangles.iter().map(|t| t.map(|v| slot[v as usize])).collect();
         mesh
+    }
+
+    #[inline]
+    fn set(&mut self, triangle: TriangleId, corners: [VertexId; 3]) {
+        let at = triangle as usize;
+        if self.triangles.len() <= at {
+            self.triangles.resize(at + 1, HOLE);
+        }
+        self.triangles[at] = corners;
+        self.changed_triangles.note(triangle);
     }
 }
 
 impl MeshSink for ActiveMesh {
+    #[inline]
     fn vertex_added(&mut self, vertex: VertexId, position: [f32; 3]) {
-        let slot = self.holes.pop().unwrap_or_else(|| {
-            self.positions.push(position);
-            self.vertex_in.push(NONE);
-            self.positions.len() as u32 - 1
-        });
-        self.positions[slot as usize] = position;
-        self.vertex_in[slot as usize] = vertex;
-        self.slot_of_vertex[vertex as usize] = slot;
-        self.changed_vertices.note(slot);
-    }
-
-    fn vertex_removed(&mut self, vertex: VertexId) {
-        let slot = self.slot_of_vertex[vertex as usize];
-        self.slot_of_vertex[vertex as usize] = NONE;
-        self.vertex_in[slot as usize] = NONE;
-        self.holes.push(slot);
-    }
-
-    fn triangle_added(&mut self, triangle: TriangleId, corners: [VertexId; 3]) {
-        let slot = self.triangles.len() as u32;
-        self.triangles.push(corners.map(|v| self.slot_of_vertex[v as usize]));
-        self.triangle_in.push(triangle);
-        self.slot_of_triangle[triangle as usize] = slot;
-        self.changed_triangles.note(slot);
-    }
-
-    fn triangle_removed(&mut self, triangle: TriangleId) {
-        let slot = self.slot_of_triangle[triangle as usize];
-        self.slot_of_triangle[triangle as usize] = NONE;
-        self.triangles.swap_remove(slot as usize);
-        self.triangle_in.swap_remove(slot as usize);
-        if let Some(&moved) = self.triangle_in.get(slot as usize) {
-            self.slot_of_triangle[moved as usize] = slot;
+        let at = vertex as usize;
+        if self.positions.len() <= at {
+            self.positions.resize(at + 1, position);
         }
-        self.changed_triangles.note(slot);
+        self.vertices += 1;
+        self.positions[at] = position;
+        self.changed_vertices.note(vertex);
     }
 
+    #[inline]
+    fn vertex_removed(&mut self, _: VertexId) {
+        self.vertices -= 1;
+    }
+
+    #[inline]
+    fn triangle_added(&mut self, triangle: TriangleId, corners: [VertexId; 3]) {
+        self.displayed += 1;
+        self.set(triangle, corners);
+    }
+
+    #[inline]
+    fn triangle_removed(&mut self, triangle: TriangleId) {
+        self.displayed -= 1;
+        self.set(triangle, HOLE);
+        if triangle as usize + 1 == self.triangles.len() {
+            self.triangles.pop();
+        }
+    }
+
+    #[inline]
     fn corner_moved(&mut self, triangle: TriangleId, corner: usize, to: VertexId) {
-        let slot = self.slot_of_triangle[triangle as usize];
-        self.triangles[slot as usize][corner] = self.slot_of_vertex[to as usize];
-        self.changed_triangles.note(slot);
+        self.triangles[triangle as usize][corner] = to;
+        self.changed_triangles.note(triangle);
     }
 }

@@ -200,7 +200,7 @@ impl Subject {
     ) -> Result<Engine<InMemoryTree, ActiveMesh>, CompareError> {
         let settings =
             Settings { strategy: Strategy::TopDown, criterion: options.criterion, ..Settings::default() };
-        let mut engine = self.engine(settings, ActiveMesh::new)?;
+        let mut engine = self.engine(settings, |_| ActiveMesh::new())?;
         let view = View::new(&path.camera(frame), options.theta);
         engine.advance(&[view]).map_err(|source| self.tree_error(source))?;
         Ok(engine)
@@ -234,7 +234,7 @@ impl Subject {
                 omega: speed.omega,
                 budget: options.budget,
             };
-            let mut engine = self.engine(settings, ActiveMesh::new)?;
+            let mut engine = self.engine(settings, |_| ActiveMesh::new())?;
             let mut rows = Vec::with_capacity(views.len());
             for (frame, view) in frames.clone().zip(&views) {
                 let report = engine.advance(std::slice::from_ref(view)).map_err(|e| self.tree_error(e))?;

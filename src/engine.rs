@@ -88,6 +88,8 @@ pub struct FrameReport {
     pub folds: u64,
     /// Those of the unfolds that no view wanted: another node needed them.
     pub forced: u64,
+    /// Wanted changes that a rule of the backend's own forbade, see [`Step::Blocked`].
+    pub blocked: u64,
     /// Wanted changes that the backend refused for want of a page.
     pub misses: u64,
     /// Active nodes at the end.
@@ -145,6 +147,7 @@ pub struct Engine<T, M> {
     flips: Flips,
     stack: Vec<Pending>,
     missing: Vec<NodeId>,
+    blocked: Vec<NodeId>,
     still_needed: Vec<NodeId>,
     arrived: Vec<NodeId>,
     drawing_time: Duration,
@@ -186,6 +189,7 @@ impl<T: VertexTree, M: MeshSink> Engine<T, M> {
             flips: Flips::default(),
             stack: Vec::new(),
             missing: Vec::new(),
+            blocked: Vec::new(),
             still_needed: Vec::new(),
             arrived: Vec::new(),
             drawing_time: Duration::ZERO,
@@ -280,19 +284,24 @@ impl<T: VertexTree, M: MeshSink> Engine<T, M> {
             frame: &frame,
             stack: &mut self.stack,
             missing: &mut self.missing,
+            blocked: &mut self.blocked,
             still_needed: &mut self.still_needed,
             counts: Counts::default(),
             tests: 0,
         };
         step.missing.clear();
+        step.blocked.clear();
         let applied = step.apply(&self.flips);
         if applied.is_err() {
             step.abandon(&self.flips);
         }
         let (counts, tests) = (step.counts, self.flips.tests + step.tests);
-        self.missing.sort_unstable();
-        self.missing.dedup();
-        let misses = self.missing.len() as u64;
+        let distinct = |nodes: &mut Vec<NodeId>| {
+            nodes.sort_unstable();
+            nodes.dedup();
+            nodes.len() as u64
+        };
+        let (misses, blocked) = (distinct(&mut self.missing), distinct(&mut self.blocked));
         let apply = found.elapsed();
         self.finder.settle(&frame);
         applied?;
@@ -316,6 +325,7 @@ impl<T: VertexTree, M: MeshSink> Engine<T, M> {
             unfolds: counts.unfolds,
             folds: counts.folds,
             forced: counts.forced,
+            blocked,
             misses,
             active_nodes: self.front.active_nodes() as u64,
             triangles,
@@ -340,6 +350,8 @@ struct Steps<'a, T, M> {
     stack: &'a mut Vec<Pending>,
     /// Nodes whose change was refused for want of a page; some more than once.
     missing: &'a mut Vec<NodeId>,
+    /// Nodes whose change a rule of the backend's own forbade; some more than once.
+    blocked: &'a mut Vec<NodeId>,
     /// Nodes that no view wants and that something else still needs.
     still_needed: &'a mut Vec<NodeId>,
     counts: Counts,
@@ -429,6 +441,11 @@ impl<T: VertexTree, M: MeshSink> Steps<'_, T, M> {
                     self.refused(node, Kind::Fold);
                     continue;
                 }
+                Step::Blocked => {
+                    self.blocked.push(node);
+                    self.refused(node, Kind::Fold);
+                    continue;
+                }
                 Step::StillNeeded | Step::Needs(_) => {
                     self.still_needed.push(node);
                     continue;
@@ -485,6 +502,11 @@ impl<T: VertexTree, M: MeshSink> Steps<'_, T, M> {
                         pending.waits = true;
                     }
                     self.stack.push(Pending::needed(other));
+                    continue;
+                }
+                Step::Blocked => {
+                    self.blocked.push(node);
+                    self.give_up();
                     continue;
                 }
                 Step::Needs(_) | Step::NotResident | Step::StillNeeded => {

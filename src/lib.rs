@@ -33,7 +33,7 @@
 //!
 //! // Once a viewer: an engine, with the displayed mesh as vertex and index buffers.
 //! let tree = InMemoryTree::new(hierarchy);
-//! let buffers = ActiveMesh::new(&tree);
+//! let buffers = ActiveMesh::new();
 //! // How fast the camera is expected to move: object units and radians a frame. A faster one is no less exact.
 //! let settings = Settings { rho: 0.02, omega: 0.02, ..Settings::default() };
 //! let mut engine = Engine::new(tree, buffers, settings)?;
@@ -49,7 +49,7 @@
 //!         let _ = buffers.triangles().get(slot as usize);
 //!     }
 //!     buffers.clear_changes();
-//!     assert_eq!(report.triangles, buffers.triangles().len() as u64);
+//!     assert_eq!(report.triangles, buffers.displayed() as u64);
 //! }
 //! # Ok(())
 //! # }
@@ -75,7 +75,6 @@ mod frustum;
 pub mod mesh_io;
 pub mod motion;
 pub mod oracle;
-pub mod output;
 mod packed;
 mod parallel;
 pub mod path;
@@ -95,4 +94,5 @@ pub use glam;
 #[cfg(feature = "in-memory")]
 pub use in_memory;
 pub use vertex_tree;
+pub use vertex_tree::output;
 pub use vertex_tree::{Bounds, Collapse, CollapseLog, Mesh, NodeId, VertexTree};

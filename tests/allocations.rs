@@ -49,7 +49,7 @@ fn a_path_that_has_been_walked_before_allocates_nothing() {
         let mut random = Random(21);
         let log = random_log(bumpy_grid(40, &mut random), &mut random);
         let tree = InMemoryTree::new(Arc::new(Hierarchy::new(&log).unwrap()));
-        let mesh = ActiveMesh::new(&tree);
+        let mesh = ActiveMesh::new();
         let settings = Settings { strategy, rho: 0.01, omega: 0.01, ..Settings::default() };
         let mut engine = Engine::new(tree, mesh, settings).unwrap();
         // There and back again, so that the end of one round is the start of the next.

@@ -178,7 +178,7 @@ pub fn write_frames(file: &Path, runs: &[&Run]) -> Result<(), WriteError> {
                     r.unfolds.to_string(),
                     r.folds.to_string(),
                     r.forced.to_string(),
-                    "0".to_owned(),
+                    r.blocked.to_string(),
                     "0".to_owned(),
                     r.misses.to_string(),
                     row.wrong.map_or_else(String::new, |w| w.to_string()),

@@ -244,14 +244,6 @@ impl VertexTree for GraphTree {
         self.graph.bounds.len() as u32
     }
 
-    fn vertex_count(&self) -> u32 {
-        0
-    }
-
-    fn triangle_count(&self) -> u32 {
-        0
-    }
-
     fn displayed_triangles(&self) -> u64 {
         self.log.borrow().active.iter().filter(|&&active| active).count() as u64
     }

@@ -220,16 +220,4 @@ impl Hierarchy {
     pub fn log_number(&self, node: NodeId) -> u32 {
         self.nodes[node.index()].log_number
     }
-
-    /// Input vertex that a [`VertexId`](vertex_tree::VertexId) of this backend stands for.
-    #[must_use]
-    pub fn input_vertex(&self, vertex: u32) -> u32 {
-        self.input_vertex[vertex as usize]
-    }
-
-    /// Input triangle that a [`TriangleId`](vertex_tree::TriangleId) of this backend stands for.
-    #[must_use]
-    pub fn input_triangle(&self, triangle: u32) -> u32 {
-        self.input_triangle[triangle as usize]
-    }
 }

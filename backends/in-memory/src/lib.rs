@@ -14,8 +14,6 @@
 //! ```
 
 mod hierarchy;
-mod leaf_set;
-mod live;
 mod tree;
 
 pub use hierarchy::Hierarchy;

@@ -2,12 +2,13 @@
 
 use std::sync::Arc;
 
-use vertex_tree::{Bounds, MeshSink, NONE, NodeId, PageStats, Step, TreeError, VertexTree};
+use vertex_tree::{
+    Bounds, LeafTriangle, MeshSink, NONE, NodeId, PageStats, StarMesh, Step, TreeError, TriangleId, VertexId,
+    VertexTree,
+};
 
 use crate::Hierarchy;
 use crate::hierarchy::Node;
-use crate::leaf_set::LeafSet;
-use crate::live::{LiveTriangles, triangle_of};
 
 /// A hierarchy and the state of one front through it.
 ///
@@ -16,9 +17,8 @@ use crate::live::{LiveTriangles, triangle_of};
 #[derive(Clone, Debug)]
 pub struct InMemoryTree {
     hierarchy: Arc<Hierarchy>,
-    /// The vertices of the displayed mesh. Like `live`, kept only for a sink that wants the mesh.
-    shown: LeafSet,
-    live: Option<LiveTriangles>,
+    /// Kept only for a sink that wants the mesh.
+    mesh: Option<StarMesh>,
     displayed: u64,
 }
 
@@ -26,14 +26,27 @@ impl InMemoryTree {
     /// A tree with every node folded.
     #[must_use]
     pub fn new(hierarchy: Arc<Hierarchy>) -> Self {
-        let displayed = 0;
-        Self { shown: LeafSet::new(hierarchy.positions.len()), hierarchy, live: None, displayed }
+        Self { hierarchy, mesh: None, displayed: 0 }
     }
 
     /// The hierarchy that the tree shows.
     #[must_use]
     pub fn hierarchy(&self) -> &Arc<Hierarchy> {
         &self.hierarchy
+    }
+
+    /// The input vertex that is shown in a slot; `None` in a hole, and for a sink that does not keep the mesh.
+    #[must_use]
+    pub fn input_vertex(&self, vertex: VertexId) -> Option<u32> {
+        let leaf = self.mesh.as_ref()?.leaf(vertex);
+        self.hierarchy.input_vertex.get(leaf as usize).copied()
+    }
+
+    /// The input triangle that is shown in a slot; `None` as for [`input_vertex`](Self::input_vertex).
+    #[must_use]
+    pub fn input_triangle(&self, triangle: TriangleId) -> Option<u32> {
+        let number = self.mesh.as_ref()?.number(triangle);
+        self.hierarchy.input_triangle.get(number as usize).copied()
     }
 
     fn node(&self, node: NodeId) -> &Node {
@@ -47,29 +60,11 @@ impl InMemoryTree {
     }
 }
 
-/// Lists of corners that are followed at once, and how far: as many triangles as meet at most vertices.
-const PREPARED_CORNERS: usize = 32;
-const PREPARED_STEPS: usize = 7;
-
-/// The vertices at which the corners with these leaves are shown.
-fn shown_at(shown: &LeafSet, leaves: [u32; 3]) -> [u32; 3] {
-    // Every tree of the forest shows the first of its leaves at least, so there always is a vertex below.
-    leaves.map(|leaf| shown.at_or_below(leaf).unwrap_or(leaf))
-}
-
 impl VertexTree for InMemoryTree {
     const IS_TREE: bool = true;
 
     fn node_limit(&self) -> u32 {
         self.hierarchy.nodes.len() as u32
-    }
-
-    fn vertex_count(&self) -> u32 {
-        self.hierarchy.positions.len() as u32
-    }
-
-    fn triangle_count(&self) -> u32 {
-        self.hierarchy.corners.len() as u32
     }
 
     fn displayed_triangles(&self) -> u64 {
@@ -121,94 +116,35 @@ impl VertexTree for InMemoryTree {
             self.displayed = base.count() as u64;
             return Ok(());
         }
-        let mut live = LiveTriangles::new(&h.corners, h.positions.len());
+        let mut stars = StarMesh::new(h.positions.len());
         for &v in &h.base_vertices {
-            self.shown.insert(v);
-            mesh.vertex_added(v, h.positions[v as usize]);
+            stars.add_vertex(v, h.positions[v as usize], mesh);
         }
-        for t in base {
-            let vertices = shown_at(&self.shown, h.corners[t as usize]);
-            live.show(t, vertices);
-            mesh.triangle_added(t, vertices);
-            self.displayed += 1;
+        for number in base {
+            stars.add_triangle(LeafTriangle { leaves: h.corners[number as usize], number }, mesh);
         }
-        self.live = Some(live);
+        self.displayed = stars.displayed() as u64;
+        self.mesh = Some(stars);
         Ok(())
     }
 
     fn unfold<M: MeshSink>(&mut self, node: NodeId, mesh: &mut M) -> Result<Step, TreeError> {
         let brought = self.brought(node);
         self.displayed += brought.len() as u64;
-        let Some(live) = self.live.as_mut().filter(|_| M::KEEPS_MESH) else { return Ok(Step::Done) };
-        let Node { first: kept, pivot: removed, .. } = self.hierarchy.nodes[node.index()];
-        self.shown.insert(removed);
-        mesh.vertex_added(removed, self.hierarchy.positions[removed as usize]);
-        // The corners whose leaves are on the far side of the pivot follow the vertex that comes back.
-        let mut corner = live.first_at(kept);
-        while corner != NONE {
-            let next = live.next(corner);
-            if live.leaf(corner) >= removed {
-                live.move_to(corner, removed);
-                let (triangle, index) = triangle_of(corner);
-                mesh.corner_moved(triangle, index, removed);
-            }
-            corner = next;
-        }
-        for triangle in brought {
-            let vertices = shown_at(&self.shown, live.leaves(triangle));
-            live.show(triangle, vertices);
-            mesh.triangle_added(triangle, vertices);
-        }
+        let Some(stars) = self.mesh.as_mut().filter(|_| M::KEEPS_MESH) else { return Ok(Step::Done) };
+        let h = &*self.hierarchy;
+        let Node { first: kept, pivot: removed, .. } = h.nodes[node.index()];
+        let brought = brought.map(|number| LeafTriangle { leaves: h.corners[number as usize], number });
+        stars.split([kept, removed], h.positions[removed as usize], brought, mesh);
         Ok(Step::Done)
     }
 
     fn fold<M: MeshSink>(&mut self, node: NodeId, mesh: &mut M) -> Result<Step, TreeError> {
-        let brought = self.brought(node);
-        self.displayed -= brought.len() as u64;
-        let Some(live) = self.live.as_mut().filter(|_| M::KEEPS_MESH) else { return Ok(Step::Done) };
+        self.displayed -= self.brought(node).len() as u64;
+        let Some(stars) = self.mesh.as_mut().filter(|_| M::KEEPS_MESH) else { return Ok(Step::Done) };
         let Node { first: kept, pivot: removed, .. } = self.hierarchy.nodes[node.index()];
-        for triangle in brought {
-            live.hide(triangle);
-            mesh.triangle_removed(triangle);
-        }
-        let mut corner = live.first_at(removed);
-        while corner != NONE {
-            let next = live.next(corner);
-            live.move_to(corner, kept);
-            let (triangle, index) = triangle_of(corner);
-            mesh.corner_moved(triangle, index, kept);
-            corner = next;
-        }
-        self.shown.remove(removed);
-        mesh.vertex_removed(removed);
+        stars.merge([kept, removed], mesh);
         Ok(Step::Done)
-    }
-
-    fn prepare(&self, nodes: &[NodeId]) {
-        // What one node needs is a chain of reads each of which must wait for the one before. Taking the first step for
-        // all nodes, then the second, keeps many reads under way at once. The sum is only there to be read.
-        let mut sum = nodes.iter().fold(0, |sum, &n| sum ^ self.node(n).first);
-        if let Some(live) = &self.live {
-            let mut corners = [NONE; PREPARED_CORNERS];
-            for nodes in nodes.chunks(PREPARED_CORNERS / 2) {
-                for (&node, corners) in nodes.iter().zip(corners.chunks_mut(2)) {
-                    let node = self.node(node);
-                    // Whichever way the node changes, one of the two lists has its corners.
-                    corners[0] = live.first_at(node.first);
-                    corners[1] = live.first_at(node.pivot);
-                    sum ^= live.leaves(node.triangles.min(live.last()))[0];
-                }
-                for _ in 0..PREPARED_STEPS {
-                    for corner in &mut corners[..2 * nodes.len()] {
-                        if *corner != NONE {
-                            *corner = live.next(*corner);
-                        }
-                    }
-                }
-                sum ^= corners[0];
-            }
-        }
-        std::hint::black_box(sum);
     }
 
     fn end_frame(&mut self) -> Result<PageStats, TreeError> {

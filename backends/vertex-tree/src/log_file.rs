@@ -21,7 +21,7 @@ use std::fs::File;
 use std::io::{self, BufReader, BufWriter, Read, Write};
 use std::path::{Path, PathBuf};
 
-use crate::{Bounds, Collapse, CollapseLog, LogError, Mesh};
+use crate::{Bounds, Collapse, CollapseLog, LogError, Mesh, output};
 
 const MAGIC: [u8; 8] = *b"FFCOLLOG";
 const VERSION: u32 = 1;
@@ -113,22 +113,12 @@ pub enum LogFileError {
 /// [`LogFileError::Io`].
 pub fn write_log(path: &Path, log: &CollapseLog) -> Result<(), LogFileError> {
     let io = |source| LogFileError::Io { file: path.to_owned(), source };
-    let folder = match path.parent() {
-        Some(p) if !p.as_os_str().is_empty() => p,
-        _ => Path::new("."),
-    };
-    let mut builder = tempfile::Builder::new();
-    // Temporary files are for their owner alone; what is made here is a file like any other.
-    #[cfg(unix)]
-    builder.permissions(std::os::unix::fs::PermissionsExt::from_mode(0o666));
-    let mut temporary = builder.prefix(".foldfront-").tempfile_in(folder).map_err(io)?;
-    {
-        let mut out = BufWriter::with_capacity(1 << 20, temporary.as_file_mut());
-        write_to(&mut out, log).and_then(|()| out.flush()).map_err(io)?;
-    }
-    temporary.as_file().sync_all().map_err(io)?;
-    temporary.persist(path).map_err(|e| io(e.error))?;
-    Ok(())
+    output::write_with(path, |file| {
+        let mut out = BufWriter::with_capacity(1 << 20, file);
+        write_to(&mut out, log)?;
+        out.flush()
+    })
+    .map_err(io)
 }
 
 fn write_to(out: &mut impl Write, log: &CollapseLog) -> io::Result<()> {

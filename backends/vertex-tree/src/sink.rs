@@ -1,10 +1,10 @@
 //! Where a backend reports how the displayed mesh changes.
 
-/// Number of a vertex in a backend's own numbering, less than [`VertexTree::vertex_count`](crate::VertexTree).
+/// Slot of a displayed vertex. The backend hands slots out densely and uses those of vertices that have disappeared
+/// again, so a sink can index arrays by them that are no longer than the displayed mesh once was.
 pub type VertexId = u32;
 
-/// Number of a triangle in a backend's own numbering, less than
-/// [`VertexTree::triangle_count`](crate::VertexTree).
+/// Slot of a displayed triangle, likewise. A backend may move a triangle to another slot: it disappears and appears.
 pub type TriangleId = u32;
 
 /// Receives the changes of the displayed mesh, one call a change, in an order in which they can be applied: a

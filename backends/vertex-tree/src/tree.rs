@@ -27,6 +27,9 @@ pub enum Step {
     /// faces w x y z in XFastMesh; neighbours with larger ids in El-Sana & Chiang). It may be anywhere below an
     /// active node; the engine forces it, ancestors first, and asks again.
     Needs(NodeId),
+    /// A rule of the backend's own forbids the change for now (El-Sana & Chiang's implicit dependencies, where they
+    /// block instead of forcing). The change is counted as blocked and asked for again in every frame.
+    Blocked,
     /// Folding: something unfolded depends on this node. It folds when nothing does any more.
     StillNeeded,
     /// The page that holds the node, or its children, is not in memory. It has been asked for, and the node will
@@ -43,6 +46,8 @@ pub struct PageStats {
     pub read_bytes: u64,
     /// Bytes of the hierarchy now in memory.
     pub resident_bytes: u64,
+    /// Reads since the last call that failed, or brought a damaged page. They are tried again.
+    pub faults: u64,
 }
 
 /// A backend can not go on: its store failed in a way that asking again will not mend.
@@ -98,10 +103,6 @@ pub trait VertexTree {
 
     /// One more than the largest node number.
     fn node_limit(&self) -> u32;
-    /// One more than the largest [`VertexId`](crate::VertexId).
-    fn vertex_count(&self) -> u32;
-    /// One more than the largest [`TriangleId`](crate::TriangleId).
-    fn triangle_count(&self) -> u32;
     /// How many triangles are displayed now; known also where the sink does not keep the mesh.
     fn displayed_triangles(&self) -> u64;
     /// The inner nodes that have no structural parent.
@@ -139,6 +140,11 @@ pub trait VertexTree {
     /// be asked again.
     fn begin_frame(&mut self, arrived: &mut Vec<NodeId>) -> Result<(), TreeError> {
         let _ = arrived;
+        Ok(())
+    }
+    /// Waits until every page that has been asked for has arrived or failed: for replays whose cuts shall be comparable,
+    /// and for a first frame. Nothing else here may wait.
+    fn settle(&mut self) -> Result<(), TreeError> {
         Ok(())
     }
     /// Ends a frame: the moment for eviction.

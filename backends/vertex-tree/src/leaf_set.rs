@@ -5,7 +5,7 @@
 /// The front's vertices are kept in one: numbered depth-first, the vertex that stands for a leaf is the nearest one
 /// at or below it.
 #[derive(Clone, Debug)]
-pub struct LeafSet {
+pub(crate) struct LeafSet {
     /// `levels[0]` has a bit a number; bit `i` of `levels[l + 1]` says whether word `i` of `levels[l]` is not 0.
     levels: Vec<Vec<u64>>,
 }

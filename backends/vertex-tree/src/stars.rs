@@ -1,0 +1,174 @@
+//! The star of each displayed vertex: which corners of displayed triangles are there.
+//!
+//! Most vertices have about six. A star of up to 14 lies in one cache line; a larger one moves to a list of its own.
+
+use crate::NONE;
+
+/// Corner `c` of the triangle in slot `t` is numbered `4 t + c`: the triangle is found by a shift.
+pub(crate) type Corner = u32;
+
+#[inline(always)]
+pub(crate) fn corner(triangle: u32, index: usize) -> Corner {
+    triangle << 2 | index as u32
+}
+
+#[inline(always)]
+pub(crate) fn triangle_of(corner: Corner) -> (usize, usize) {
+    ((corner >> 2) as usize, (corner & 3) as usize)
+}
+
+/// Corners that fit beside the rest of a star's cache line.
+const NEAR: usize = 14;
+
+#[derive(Clone, Copy, Debug)]
+#[repr(C, align(64))]
+struct Star {
+    /// The leaf whose vertex is shown here; [`NONE`] in a hole.
+    leaf: u32,
+    /// How many corners are in `near`, or [`FAR`] where they are in the list of which `near[0]` is the number.
+    count: u32,
+    near: [Corner; NEAR],
+}
+
+const FAR: u32 = u32::MAX;
+
+/// The stars of all displayed vertices, by the vertex's slot.
+#[derive(Clone, Debug, Default)]
+pub(crate) struct Stars {
+    stars: Vec<Star>,
+    holes: Vec<u32>,
+    far: Vec<Vec<Corner>>,
+    unused_far: Vec<u32>,
+}
+
+impl Stars {
+    /// A vertex appears; returns its slot. Slots are used again last in, first out.
+    #[inline]
+    pub fn add(&mut self, leaf: u32) -> u32 {
+        let star = Star { leaf, count: 0, near: [NONE; NEAR] };
+        match self.holes.pop() {
+            Some(slot) => {
+                self.stars[slot as usize] = star;
+                slot
+            }
+            None => {
+                self.stars.push(star);
+                self.stars.len() as u32 - 1
+            }
+        }
+    }
+
+    /// A vertex disappears. No corner is left there.
+    #[inline]
+    pub fn remove(&mut self, slot: u32) {
+        debug_assert!(self.corners(slot).is_empty());
+        let star = &mut self.stars[slot as usize];
+        star.leaf = NONE;
+        if star.count == FAR {
+            self.unused_far.push(star.near[0]);
+            star.count = 0;
+        }
+        self.holes.push(slot);
+    }
+
+    /// The leaf that is shown in a slot; [`NONE`] in a hole.
+    #[inline(always)]
+    pub fn leaf(&self, slot: u32) -> u32 {
+        self.stars[slot as usize].leaf
+    }
+
+    #[inline(always)]
+    pub fn corners(&self, slot: u32) -> &[Corner] {
+        let star = &self.stars[slot as usize];
+        if star.count == FAR {
+            &self.far[star.near[0] as usize]
+        } else {
+            // The bound is never reached, and spares a panic.
+            &star.near[..(star.count as usize).min(NEAR)]
+        }
+    }
+
+    #[inline(always)]
+    pub fn push(&mut self, slot: u32, corner: Corner) {
+        let star = &mut self.stars[slot as usize];
+        match star.near.get_mut(star.count as usize) {
+            Some(place) => {
+                *place = corner;
+                star.count += 1;
+            }
+            None => self.push_far(slot, corner),
+        }
+    }
+
+    #[cold]
+    fn push_far(&mut self, slot: u32, corner: Corner) {
+        let star = &mut self.stars[slot as usize];
+        if star.count != FAR {
+            let number = self.unused_far.pop().unwrap_or_else(|| {
+                self.far.push(Vec::with_capacity(4 * NEAR));
+                self.far.len() as u32 - 1
+            });
+            let far = &mut self.far[number as usize];
+            far.clear();
+            far.extend_from_slice(&star.near);
+            star.count = FAR;
+            star.near[0] = number;
+        }
+        self.far[star.near[0] as usize].push(corner);
+    }
+
+    /// Replaces a corner that is in the star by another, or removes it.
+    #[inline(always)]
+    pub fn replace(&mut self, slot: u32, corner: Corner, by: Option<Corner>) {
+        let Some(at) = self.corners(slot).iter().position(|&c| c == corner) else { return };
+        let star = &mut self.stars[slot as usize];
+        if star.count == FAR {
+            let far = &mut self.far[star.near[0] as usize];
+            match by {
+                Some(by) => far[at] = by,
+                None => drop(far.swap_remove(at)),
+            }
+        } else if let Some(by) = by {
+            star.near[at] = by;
+        } else {
+            star.count -= 1;
+            star.near[at] = star.near[star.count as usize % NEAR];
+        }
+    }
+
+    /// Moves the corners for which `moves` says so from one star to another.
+    #[inline(always)]
+    pub fn split(&mut self, from: u32, to: u32, mut moves: impl FnMut(Corner) -> bool) {
+        let mut at = 0;
+        while let Some(&corner) = self.corners(from).get(at) {
+            if moves(corner) {
+                self.remove_at(from, at);
+                self.push(to, corner);
+            } else {
+                at += 1;
+            }
+        }
+    }
+
+    #[inline(always)]
+    fn remove_at(&mut self, slot: u32, at: usize) {
+        let star = &mut self.stars[slot as usize];
+        if star.count == FAR {
+            self.far[star.near[0] as usize].swap_remove(at);
+        } else {
+            star.count -= 1;
+            star.near[at % NEAR] = star.near[star.count as usize % NEAR];
+        }
+    }
+
+    /// Takes the last corner out of a star.
+    #[inline(always)]
+    pub fn pop(&mut self, slot: u32) -> Option<Corner> {
+        let star = &mut self.stars[slot as usize];
+        if star.count == FAR {
+            return self.far[star.near[0] as usize].pop();
+        }
+        star.count = star.count.checked_sub(1)?;
+        Some(star.near[star.count as usize % NEAR])
+    }
+}
