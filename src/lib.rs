@@ -93,6 +93,8 @@ pub mod view;
 pub use glam;
 #[cfg(feature = "in-memory")]
 pub use in_memory;
+#[cfg(feature = "mt-partition")]
+pub use mt_partition;
 pub use vertex_tree;
 pub use vertex_tree::output;
 pub use vertex_tree::{Bounds, Collapse, CollapseLog, Mesh, NodeId, VertexTree};

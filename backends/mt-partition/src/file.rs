@@ -120,6 +120,12 @@ impl MtFile {
         self.header.nodes as u32
     }
 
+    /// Triangles of the base mesh.
+    #[must_use]
+    pub fn base_triangles(&self) -> u32 {
+        self.base.fine()
+    }
+
     /// Bytes of memory that trees over this file need at least, see [`Memory`](crate::Memory).
     #[must_use]
     pub fn least_memory(&self) -> u64 {

@@ -51,6 +51,9 @@ pub(crate) struct Paging {
     /// For each node, its arcs in the cut.
     links: Vec<u32>,
     frame: u64,
+    /// Counts the frames that ended with nothing on its way: a frame that waits for pages and is repeated is one to the
+    /// cache mode.
+    round: u64,
     /// By the node that is to change.
     groups: FxHashMap<u32, Group>,
     /// By what is read, a partition or a node: the nodes that wait for it.
@@ -81,6 +84,7 @@ impl Paging {
             partitions: vec![PartitionState::default(); file.partitions.len() - 1],
             links: vec![0; file.nodes() as usize],
             frame: 0,
+            round: 1,
             groups: FxHashMap::default(),
             reads: FxHashMap::default(),
             reserved: FxHashSet::default(),
@@ -148,8 +152,8 @@ impl Paging {
         let partition = self.file.partition_of(node);
         let state = &mut self.partitions[partition as usize];
         match change {
-            Change::Unfold => state.came_down(self.frame, layer),
-            Change::Fold => state.came_up(self.frame, layer),
+            Change::Unfold => state.came_down(self.round, layer),
+            Change::Fold => state.came_up(self.round, layer),
         }
         self.mark(partition);
     }
@@ -353,6 +357,7 @@ impl Paging {
         self.unanswered_frames = if self.groups.is_empty() { 0 } else { self.unanswered_frames + 1 };
         if self.groups.is_empty() || self.unanswered_frames > PATIENCE {
             self.unanswered_frames = 0;
+            self.round += 1;
             self.clean();
         }
         let mut stats = std::mem::take(&mut self.stats);
