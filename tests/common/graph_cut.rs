@@ -79,7 +79,10 @@ impl GraphCut {
     }
 
     /// The first nodes that an engine has otherwise, with whether the cut has them active, and how many there are.
-    pub fn difference<T: VertexTree, M: MeshSink>(&self, engine: &Engine<T, M>) -> Option<(Vec<(usize, bool)>, usize)> {
+    pub fn difference<T: VertexTree, M: MeshSink>(
+        &self,
+        engine: &Engine<T, M>,
+    ) -> Option<(Vec<(usize, bool)>, usize)> {
         let mut differs = self.active.clone();
         engine.for_each_active(|node| differs[node.index()] = !differs[node.index()]);
         let nodes: Vec<usize> = (0..differs.len()).filter(|&n| differs[n]).collect();

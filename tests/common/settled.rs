@@ -10,7 +10,10 @@ pub struct Settled<T>(pub T);
 const PATIENCE: usize = 100;
 
 impl<T: VertexTree> Settled<T> {
-    fn insist(&mut self, mut change: impl FnMut(&mut T) -> Result<Step, TreeError>) -> Result<Step, TreeError> {
+    fn insist(
+        &mut self,
+        mut change: impl FnMut(&mut T) -> Result<Step, TreeError>,
+    ) -> Result<Step, TreeError> {
         for _ in 0..PATIENCE {
             match change(&mut self.0)? {
                 Step::NotResident => {

@@ -121,7 +121,9 @@ impl<'a> Writer<'a> {
         let mut above = vec![(0, 0); above_starts[nodes] as usize];
         for n in 0..=nodes {
             let (start, end) = (starts[n] as usize, starts[n + 1] as usize);
-            for (position, &(below, _)) in (0..).zip(&arcs[start..end]).filter(|(_, (below, _))| *below != NONE) {
+            for (position, &(below, _)) in
+                (0..).zip(&arcs[start..end]).filter(|(_, (below, _))| *below != NONE)
+            {
                 let at = &mut next[below as usize];
                 above[*at as usize] = (if n == nodes { NONE } else { n as u32 }, position);
                 *at += 1;

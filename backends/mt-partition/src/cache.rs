@@ -101,7 +101,8 @@ impl PartitionState {
             CacheMode::PCc => self.in_cut > 0,
             CacheMode::PC => {
                 self.in_cut > 0
-                    && (is_set(self.min) && layer > self.min.layer || is_set(self.max) && layer < self.max.layer)
+                    && (is_set(self.min) && layer > self.min.layer
+                        || is_set(self.max) && layer < self.max.layer)
             }
         }
     }
@@ -116,7 +117,8 @@ mod tests {
     #[test]
     fn the_cut_comes_down() {
         let mut partition = PartitionState { in_cut: 2, resident: 5, ..PartitionState::default() };
-        let kept = |p: &PartitionState| (3..8).filter(|&layer| p.keeps(CacheMode::PC, layer)).collect::<Vec<u32>>();
+        let kept =
+            |p: &PartitionState| (3..8).filter(|&layer| p.keeps(CacheMode::PC, layer)).collect::<Vec<u32>>();
         assert_eq!(kept(&partition), [0; 0], "nothing is known yet");
         partition.came_down(1, 4);
         partition.came_down(1, 3);

@@ -25,7 +25,10 @@ pub struct MtFile {
 
 impl std::fmt::Debug for MtFile {
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
-        f.debug_struct("MtFile").field("name", &self.name()).field("header", &self.header).finish_non_exhaustive()
+        f.debug_struct("MtFile")
+            .field("name", &self.name())
+            .field("header", &self.header)
+            .finish_non_exhaustive()
     }
 }
 
@@ -66,7 +69,10 @@ impl MtFile {
                 return Err(range(HEADER as u64, "root", node));
             }
             let [x, y, z, radius, eps] = [x, y, z, radius, eps].map(f32::from_bits);
-            if ![x, y, z].iter().all(|x| x.is_finite()) || !(0.0..=f32::MAX).contains(&radius) || !(0.0..=f32::MAX).contains(&eps) {
+            if ![x, y, z].iter().all(|x| x.is_finite())
+                || !(0.0..=f32::MAX).contains(&radius)
+                || !(0.0..=f32::MAX).contains(&eps)
+            {
                 return Err(range(HEADER as u64, "bounds of root", node));
             }
             roots.push(NodeId(node));
@@ -74,10 +80,13 @@ impl MtFile {
         }
         let start = at;
         let table = opener.table("partitions", &mut at, header.partitions * PARTITION)?;
-        let mut partitions: Vec<u32> = table.chunks_exact(PARTITION as usize).map(|e| words::<1>(e)[0]).collect();
+        let mut partitions: Vec<u32> =
+            table.chunks_exact(PARTITION as usize).map(|e| words::<1>(e)[0]).collect();
         partitions.push(header.nodes as u32);
         let ascending = partitions.windows(2).find(|pair| pair[0] >= pair[1]);
-        if let Some(pair) = ascending.or(partitions.first().filter(|&&first| first != 0).map(|_| &partitions[..1])) {
+        if let Some(pair) =
+            ascending.or(partitions.first().filter(|&&first| first != 0).map(|_| &partitions[..1]))
+        {
             return Err(range(start, "first node of a partition", pair[0]));
         }
         let start = at;
@@ -97,7 +106,15 @@ impl MtFile {
             log_numbers.push(log_number);
         }
         if end != source.len() {
-            return Err(MtError::Length { file: source.name().to_owned(), expected: end, actual: source.len() });
+            return Err(MtError::Length {
+                file: source.name().to_owned(),
+                expected: end,
+                actual: source.len(),
+            });
+        }
+        // Memory is measured by it.
+        if header.change_bytes > end {
+            return Err(opener.range(104, "bytes of the largest change", header.change_bytes));
         }
         let bytes = opener.read(at, header.source_bytes)?;
         let limits = Limits { nodes: header.nodes as u32, vertices: header.vertices as u32 };
@@ -146,11 +163,35 @@ impl MtFile {
             ("triangles", triangles.to_string()),
             ("collapses", h.collapses.to_string()),
             ("nodes", format!("{} ({:.1} collapses each)", h.nodes, per(h.collapses, h.nodes))),
-            ("partitions", format!("{layers} ({:.1} nodes each, at most {})", per(h.nodes, h.partitions), h.partition_limit)),
+            (
+                "partitions",
+                format!(
+                    "{layers} ({:.1} nodes each, at most {})",
+                    per(h.nodes, h.partitions),
+                    h.partition_limit
+                ),
+            ),
             ("queue order", if h.decreasing == 1 { "decreasing" } else { "increasing" }.to_owned()),
             ("roots", h.roots.to_string()),
-            ("triangles on arcs", format!("{} ({:.2} an input triangle, {:.2} unreduced)", h.stored, per(h.stored, triangles), per(h.unreduced_stored, triangles))),
-            ("arcs", format!("{} ({:.2} triangles each, {:.2} unreduced, {} requested)", h.arcs, per(h.stored, h.arcs), per(h.unreduced_stored, h.unreduced_arcs), h.patch)),
+            (
+                "triangles on arcs",
+                format!(
+                    "{} ({:.2} an input triangle, {:.2} unreduced)",
+                    h.stored,
+                    per(h.stored, triangles),
+                    per(h.unreduced_stored, triangles)
+                ),
+            ),
+            (
+                "arcs",
+                format!(
+                    "{} ({:.2} triangles each, {:.2} unreduced, {} requested)",
+                    h.arcs,
+                    per(h.stored, h.arcs),
+                    per(h.unreduced_stored, h.unreduced_arcs),
+                    h.patch
+                ),
+            ),
             ("growth of radii", format!("{:.3} mean, {:.2} largest", h.inflation[0], h.inflation[1])),
             ("base triangles", self.base.fine().to_string()),
             ("least memory", self.least_memory().to_string()),
@@ -181,8 +222,13 @@ impl MtFile {
         let record = |node: u32| {
             let [from, to] = [node, node + 1].map(|n| (self.offsets[n as usize] - start) as usize);
             let offset = start + from as u64;
-            let record = Record::new(&bytes[from..to], limits).map_err(|wrong| opener.record(offset, wrong))?;
-            if record.number() == node { Ok(record) } else { Err(opener.range(offset, "node", record.number().into())) }
+            let record =
+                Record::new(&bytes[from..to], limits).map_err(|wrong| opener.record(offset, wrong))?;
+            if record.number() == node {
+                Ok(record)
+            } else {
+                Err(opener.range(offset, "node", record.number().into()))
+            }
         };
         Ok(nodes.map(record).collect())
     }
@@ -277,8 +323,6 @@ impl Opener<'_> {
             (40, "nodes", header.nodes, header.collapses),
             (48, "partitions", header.partitions, header.nodes),
             (56, "roots", header.roots, header.nodes),
-            (96, "bytes of the source", header.source_bytes, actual),
-            (104, "bytes of the largest change", header.change_bytes, actual),
             (112, "nodes of the largest change", header.change_nodes, header.nodes),
         ];
         for (offset, what, value, limit) in limits {

@@ -1,14 +1,17 @@
 //! A memory budget that several trees can share.
 
-use std::sync::Arc;
+use std::collections::BTreeMap;
 use std::sync::atomic::{AtomicU64, Ordering};
+use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 
 /// Bytes that nodes may take in memory, and how many do, over all trees that hold a clone of it. The tables of a file and
 /// its base mesh are not counted: they are always there.
 ///
 /// A tree reserves room before it asks for nodes, so the limit is never exceeded, unless it is lowered: then the trees let
-/// go of what they can at the end of their next frame. A tree that finds no room says so, and all of them make some at the
-/// end of their frames: first what no cut holds, least recently used first, then what some cut does.
+/// go of what they can at the end of their next frame. A tree that finds no room, even after letting go of all that it can
+/// itself, says so, and the others make some at the end of their frames: first what no cut holds, least recently used
+/// first, then what some cut does. Where several want room, the one that was there first gets it, and does not give way to
+/// the others meanwhile: otherwise each could lose what it has waited for before the rest of it comes.
 #[derive(Clone, Debug)]
 pub struct Memory(Arc<Shared>);
 
@@ -16,8 +19,9 @@ pub struct Memory(Arc<Shared>);
 struct Shared {
     limit: AtomicU64,
     used: AtomicU64,
-    /// Bytes that some tree could not have.
-    wanted: AtomicU64,
+    members: AtomicU64,
+    /// By member, what could not be had.
+    wanted: Mutex<BTreeMap<u64, u64>>,
 }
 
 impl Default for Memory {
@@ -31,7 +35,8 @@ impl Memory {
     /// So many bytes.
     #[must_use]
     pub fn new(limit: u64) -> Self {
-        Self(Arc::new(Shared { limit: limit.into(), used: 0.into(), wanted: 0.into() }))
+        let (used, members) = (0.into(), 0.into());
+        Self(Arc::new(Shared { limit: limit.into(), used, members, wanted: Mutex::default() }))
     }
 
     /// Another limit from now on.
@@ -63,19 +68,29 @@ impl Memory {
         self.0.used.fetch_sub(bytes, Ordering::Relaxed);
     }
 
-    /// Says that so many bytes could not be had.
-    pub(crate) fn want(&self, bytes: u64) {
-        self.0.wanted.fetch_max(bytes, Ordering::Relaxed);
+    /// A number for a tree that shares this budget from now on.
+    pub(crate) fn join(&self) -> u64 {
+        self.0.members.fetch_add(1, Ordering::Relaxed)
     }
 
-    /// Says that they have been.
-    pub(crate) fn satisfied(&self) {
-        self.0.wanted.store(0, Ordering::Relaxed);
+    fn wanted(&self) -> MutexGuard<'_, BTreeMap<u64, u64>> {
+        self.0.wanted.lock().unwrap_or_else(PoisonError::into_inner)
     }
 
-    /// Bytes that must go for the limit to be kept and for what somebody wants to fit.
-    pub(crate) fn excess(&self) -> u64 {
-        let wanted = self.0.wanted.load(Ordering::Relaxed);
+    /// Says how many bytes a tree wants and can not have: 0 if that is over.
+    pub(crate) fn want(&self, member: u64, bytes: u64) {
+        if bytes > 0 {
+            self.wanted().insert(member, bytes);
+        } else {
+            self.wanted().remove(&member);
+        }
+    }
+
+    /// Bytes of which a tree must let go of what it can, for the limit to be kept and for what the first of those who
+    /// want something wants.
+    pub(crate) fn excess(&self, member: u64) -> u64 {
+        let first = self.wanted().first_key_value().map(|(&first, &bytes)| (first, bytes));
+        let wanted = first.filter(|&(first, _)| first != member).map_or(0, |(_, bytes)| bytes);
         self.used().saturating_add(wanted).saturating_sub(self.limit())
     }
 }

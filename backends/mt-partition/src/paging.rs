@@ -69,6 +69,11 @@ pub(crate) struct Paging {
     dirty: Vec<u32>,
     answers: Vec<Answer>,
     unanswered_frames: u32,
+    /// This tree's number among those that share the budget.
+    member: u64,
+    /// Bytes that could not be had in this frame, and whether the others know.
+    wanted: u64,
+    has_told: bool,
     /// Frames in a row in which room was wanted that could not be had by letting go of what no cut holds.
     pressed: u32,
     stats: PageStats,
@@ -77,7 +82,11 @@ pub(crate) struct Paging {
 
 impl Paging {
     pub fn new(file: Arc<MtFile>, mode: CacheMode, memory: Memory, reader: Reader) -> Self {
+        let member = memory.join();
         let mut paging = Self {
+            member,
+            wanted: 0,
+            has_told: false,
             line: Line::new(reader, file.clone()),
             mode,
             residents: Residents::new(file.nodes(), memory),
@@ -99,7 +108,7 @@ impl Paging {
             is_lost: false,
             file,
         };
-        for root in paging.file.clone().roots.iter() {
+        for root in &paging.file.clone().roots {
             paging.set_links(root.0, 1);
         }
         paging
@@ -221,7 +230,7 @@ impl Paging {
             for &n in &members {
                 self.residents.unpin(n, 0);
             }
-            self.residents.memory().want(bytes);
+            self.wanted = self.wanted.max(bytes);
             return false;
         }
         self.reserved.extend(missing);
@@ -240,7 +249,6 @@ impl Paging {
     fn reserve(&mut self, bytes: u64, spare_nothing: bool) -> bool {
         loop {
             if self.residents.memory().try_reserve(bytes) {
-                self.residents.memory().satisfied();
                 return true;
             }
             if !self.let_go_of_one(spare_nothing) {
@@ -348,10 +356,15 @@ impl Paging {
 
     pub fn end_frame(&mut self) -> PageStats {
         // What found no room may have anything that is not needed at this moment.
+        self.wanted = 0;
         for (node, change) in std::mem::take(&mut self.deferred) {
             if !self.groups.contains_key(&node) && !self.request(node, change, true) {
                 self.again.push(node);
             }
+        }
+        if self.wanted > 0 || self.has_told {
+            self.residents.memory().want(self.member, self.wanted);
+            self.has_told = self.wanted > 0;
         }
         self.relieve();
         self.unanswered_frames = if self.groups.is_empty() { 0 } else { self.unanswered_frames + 1 };
@@ -367,7 +380,7 @@ impl Paging {
 
     /// Makes room where the limit has been lowered, or where another tree could not have what it wants.
     fn relieve(&mut self) {
-        let mut excess = self.residents.memory().excess();
+        let mut excess = self.residents.memory().excess(self.member);
         self.pressed = if excess > 0 { self.pressed + 1 } else { 0 };
         while excess > 0 {
             let memory = self.residents.memory();
@@ -375,7 +388,7 @@ impl Paging {
             if !self.let_go_of_one(spare_nothing) {
                 break;
             }
-            excess = self.residents.memory().excess();
+            excess = self.residents.memory().excess(self.member);
         }
     }
 
@@ -385,13 +398,16 @@ impl Paging {
         let mut postponed = Vec::new();
         for partition in dirty.drain(..) {
             self.partitions[partition as usize].is_dirty = false;
-            let nodes = self.file.partitions[partition as usize]..self.file.partitions[partition as usize + 1];
+            let nodes =
+                self.file.partitions[partition as usize]..self.file.partitions[partition as usize + 1];
             let mut is_postponed = false;
             for node in nodes {
                 if self.links[node as usize] > 0 {
                     continue;
                 }
-                let Some(layer) = self.residents.get(node).map(crate::record::Record::layer) else { continue };
+                let Some(layer) = self.residents.get(node).map(crate::record::Record::layer) else {
+                    continue;
+                };
                 if self.partitions[partition as usize].keeps(self.mode, layer) {
                     continue;
                 }
@@ -416,5 +432,6 @@ impl Drop for Paging {
     fn drop(&mut self) {
         let reserved = self.reserved.iter().map(|&n| self.bytes_of(n)).sum();
         self.residents.memory().release(reserved);
+        self.residents.memory().want(self.member, 0);
     }
 }

@@ -61,7 +61,11 @@ impl Plan {
             firsts.push(planned.len() as u32);
             for &n in partition {
                 number[n as usize] = planned.len() as u32;
-                planned.push(PlannedNode { collapse: n, bounds: bounds[n as usize], layer: layers[n as usize] });
+                planned.push(PlannedNode {
+                    collapse: n,
+                    bounds: bounds[n as usize],
+                    layer: layers[n as usize],
+                });
             }
         }
         let renumber = |n: u32| if n == NONE { NONE } else { number[group[n as usize] as usize] };

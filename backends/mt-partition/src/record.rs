@@ -350,14 +350,17 @@ mod tests {
 
     fn encoded(vertices: u32) -> Vec<u8> {
         let positions: Vec<[f32; 3]> = (0..70_000).map(|v| [v as f32, 0.5, -1.0]).collect();
-        let row: Vec<[u32; 3]> = (0..vertices - 2).map(|v| if v % 2 == 0 { [v, v + 1, v + 2] } else { [v + 1, v, v + 2] }).collect();
+        let row: Vec<[u32; 3]> = (0..vertices - 2)
+            .map(|v| if v % 2 == 0 { [v, v + 1, v + 2] } else { [v + 1, v, v + 2] })
+            .collect();
         let arcs = [
             Patch { below: 3, triangles: &[[7, 5, 6]] },
             Patch { below: 4, triangles: &[] },
             Patch { below: NONE, triangles: &row },
         ];
         let bounds = Bounds { center: [1.0, 2.0, 3.0], radius: 4.0, eps: 0.5 };
-        let draft = Draft { number: 2, bounds, layer: 5, coarse: 8, above: &[(1, 0), (NONE, 9)], arcs: &arcs };
+        let draft =
+            Draft { number: 2, bounds, layer: 5, coarse: 8, above: &[(1, 0), (NONE, 9)], arcs: &arcs };
         let mut bytes = Vec::new();
         draft.encode(&positions, &mut bytes);
         bytes
@@ -368,7 +371,10 @@ mod tests {
         for vertices in [12, 256, 257, 65_536, 65_537] {
             let bytes = encoded(vertices);
             let record = Record::new(&bytes, LIMITS).unwrap();
-            assert_eq!((record.number(), record.layer(), record.coarse(), record.len()), (2, 5, 8, bytes.len()));
+            assert_eq!(
+                (record.number(), record.layer(), record.coarse(), record.len()),
+                (2, 5, 8, bytes.len())
+            );
             assert_eq!(record.fine(), vertices - 1);
             assert_eq!(record.bounds(), Bounds { center: [1.0, 2.0, 3.0], radius: 4.0, eps: 0.5 });
             assert_eq!(record.above().collect::<Vec<_>>(), [(1, 0), (NONE, 9)]);
@@ -381,7 +387,18 @@ mod tests {
             assert_eq!(patches[0], [[7, 5, 6]]);
             assert_eq!(patches[1], [[0; 3]; 0]);
             assert_eq!(patches[2].len(), vertices as usize - 2);
-            assert!(patches[2].iter().all(|&[a, b, c]| a.max(b) + 1 == c && a.min(b) + 2 == c));
+            let mut starts: Vec<u32> = patches[2]
+                .iter()
+                .map(|&t| {
+                    let v = t[0].min(t[1]).min(t[2]);
+                    let as_written = if v % 2 == 0 { [v, v + 1, v + 2] } else { [v + 1, v, v + 2] };
+                    let [a, b, c] = as_written;
+                    assert!([[a, b, c], [b, c, a], [c, a, b]].contains(&t), "{t:?}");
+                    v
+                })
+                .collect();
+            starts.sort_unstable();
+            assert!(starts.iter().copied().eq(0..vertices - 2));
             // A row of triangles is worth a strip: a corner a triangle and a little, not three.
             let width = width(vertices as usize);
             let tables = HEAD + 2 * ARC_IN + 3 * ARC_OUT + vertices as usize * VERTEX;

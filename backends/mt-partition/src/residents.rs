@@ -134,7 +134,8 @@ impl Residents {
         let mut later = Vec::new();
         let mut found = None;
         while let Some(&(node, stamp)) = self.queue.front() {
-            let is_current = self.all.get(self.slots[node as usize] as usize).is_some_and(|r| r.stamp == stamp);
+            let is_current =
+                self.all.get(self.slots[node as usize] as usize).is_some_and(|r| r.stamp == stamp);
             if is_current && !held_back(node) {
                 if self.is_free(node, frame) {
                     found = Some(node);

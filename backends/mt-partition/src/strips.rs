@@ -6,8 +6,9 @@
 
 use vertex_tree::NONE;
 
-/// Longest strip: its number of corners is stored in a byte.
-const LONGEST: usize = 255;
+/// Longest strip: its number of corners is stored in a byte. An even number of triangles, so that the next strip can go on
+/// where a long one ends: its first triangle has to have the sense of an even one.
+const LONGEST: usize = 254;
 
 /// Divides triangles into strips, each a list of corners.
 pub(crate) fn strips(triangles: &[[u32; 3]]) -> Vec<Vec<u32>> {
@@ -17,7 +18,9 @@ pub(crate) fn strips(triangles: &[[u32; 3]]) -> Vec<Vec<u32>> {
     let mut trial = Vec::new();
     // Triangles by how many unused neighbours they have; those whose number has fallen since come again.
     let mut queue: [Vec<u32>; 4] = Default::default();
-    let unused = |t: u32, used: &[bool]| neighbours.of[t as usize].iter().filter(|&&n| n != NONE && !used[n as usize]).count();
+    let unused = |t: u32, used: &[bool]| {
+        neighbours.of[t as usize].iter().filter(|&&n| n != NONE && !used[n as usize]).count()
+    };
     for t in (0..triangles.len() as u32).rev() {
         queue[unused(t, &used)].push(t);
     }
@@ -63,10 +66,12 @@ fn grow(
         // The next triangle lies across the edge of the last two corners, on the other side of it.
         let count = corners.len();
         let (p, q) = (corners[count - 2], corners[count - 1]);
-        let edge = |t: u32| (0..3).find(|&i| {
-            let t = triangles[t as usize];
-            [t[i], t[(i + 1) % 3]] == [p, q] || [t[i], t[(i + 1) % 3]] == [q, p]
-        });
+        let edge = |t: u32| {
+            (0..3).find(|&i| {
+                let t = triangles[t as usize];
+                [t[i], t[(i + 1) % 3]] == [p, q] || [t[i], t[(i + 1) % 3]] == [q, p]
+            })
+        };
         let next = edge(at).map_or(NONE, |i| neighbours.of[at as usize][i]);
         if next == NONE || used[next as usize] || members.contains(&next) {
             break;
@@ -87,7 +92,7 @@ fn grow(
 
 /// Triangle `j` of a strip.
 pub(crate) fn triangle(corners: &[u32], j: usize) -> [u32; 3] {
-    if j % 2 == 0 {
+    if j.is_multiple_of(2) {
         [corners[j], corners[j + 1], corners[j + 2]]
     } else {
         [corners[j + 1], corners[j], corners[j + 2]]

@@ -4,13 +4,13 @@ use std::sync::Arc;
 
 use vertex_tree::{Bounds, MeshSink, NONE, NodeId, PageStats, Step, TreeError, VertexId, VertexTree};
 
+use crate::MtError;
 use crate::cache::CacheMode;
 use crate::display::Display;
 use crate::file::MtFile;
 use crate::memory::Memory;
 use crate::paging::{Change, Paging};
 use crate::reader::Reader;
-use crate::MtError;
 
 /// How a tree pages.
 #[derive(Clone, Debug, Default)]
@@ -136,7 +136,11 @@ impl VertexTree for MtTree {
     fn bounds(&self, node: NodeId) -> Bounds {
         let record = || self.paging.residents.get(node.0).map(crate::record::Record::bounds);
         // Asked of nothing but roots and what is in memory.
-        record().or_else(|| self.file.root_bounds(node)).unwrap_or(Bounds { center: [0.0; 3], radius: 0.0, eps: 0.0 })
+        record().or_else(|| self.file.root_bounds(node)).unwrap_or(Bounds {
+            center: [0.0; 3],
+            radius: 0.0,
+            eps: 0.0,
+        })
     }
 
     #[inline]
@@ -147,7 +151,9 @@ impl VertexTree for MtTree {
     #[inline]
     fn parents(&self, node: NodeId) -> impl Iterator<Item = NodeId> {
         let record = self.paging.residents.get(node.0);
-        record.into_iter().flat_map(|record| record.above().map(|(n, _)| n).filter(|&n| n != NONE).map(NodeId))
+        record
+            .into_iter()
+            .flat_map(|record| record.above().map(|(n, _)| n).filter(|&n| n != NONE).map(NodeId))
     }
 
     fn log_number(&self, node: NodeId) -> u32 {
@@ -189,7 +195,8 @@ impl VertexTree for MtTree {
             (M::KEEPS_MESH, &mut self.display, self.paging.residents.get(node.0))
         {
             for (above, position) in record.above() {
-                let parent = if above == NONE { Some(&self.file.base) } else { self.paging.residents.get(above) };
+                let parent =
+                    if above == NONE { Some(&self.file.base) } else { self.paging.residents.get(above) };
                 if let Some(parent) = parent {
                     display.show(parent, |at, below| at == position as usize && below == node.0, mesh);
                 }

@@ -2,10 +2,10 @@
 
 use vertex_tree::NONE;
 
+use crate::MtError;
 use crate::bounds::holds;
 use crate::file::MtFile;
 use crate::record::Record;
-use crate::MtError;
 
 /// What is remembered of each node while the others are read.
 struct Seen {
@@ -35,7 +35,8 @@ impl MtFile {
     /// The first thing that does not fit.
     pub fn verify(&self) -> Result<(), MtError> {
         let nodes = self.nodes();
-        let range = |offset, what, value| MtError::Range { file: self.name().to_owned(), offset, what, value };
+        let range =
+            |offset, what, value| MtError::Range { file: self.name().to_owned(), offset, what, value };
         let mut seen: Vec<Seen> = Vec::with_capacity(nodes as usize);
         for pair in self.partitions.windows(2) {
             for (node, record) in (pair[0]..pair[1]).zip(self.read(pair[0]..pair[1])?) {
@@ -69,7 +70,8 @@ impl MtFile {
                 return Err(range(self.offset(node), "triangles above a node", seen.coarse.into()));
             }
         }
-        let counts = [("arcs", self.header.arcs, totals.0), ("triangles on arcs", self.header.stored, totals.1)];
+        let counts =
+            [("arcs", self.header.arcs, totals.0), ("triangles on arcs", self.header.stored, totals.1)];
         match counts.into_iter().find(|(_, stored, counted)| stored != counted) {
             Some((what, stored, _)) => Err(range(0, what, stored)),
             None => Ok(()),
