@@ -5,19 +5,22 @@ use foldfront::engine::Engine;
 use foldfront::plot::{Plot, Series, curves, stack};
 use foldfront::refine::Strategy;
 use foldfront::vertex_tree::NullSink;
-use mt_partition::{BuildOptions, CacheMode, QueueOrder};
+use foldfront::view::View;
+use mt_partition::{BuildOptions, CacheMode, Memory, MtTree, QueueOrder};
 
 use crate::{build, folder, near, replay, settings, tree, turning, views};
 
 /// One mode along one path.
+#[derive(Default)]
 struct Run {
+    name: &'static str,
     /// Sum of reads up to each frame, and bytes of the nodes in memory after it.
     reads: Vec<f64>,
     bytes: Vec<f64>,
 }
 
 pub fn figures(model: &str, log: &CollapseLog) {
-    for order in [QueueOrder::Decreasing, QueueOrder::Increasing] {
+    for order in [QueueOrder::Increasing, QueueOrder::Decreasing] {
         for partition in [20, 50] {
             let (file, built) = build(log, &BuildOptions { order, partition, ..BuildOptions::default() });
             println!(
@@ -28,54 +31,79 @@ pub fn figures(model: &str, log: &CollapseLog) {
             for path in [near(&log.mesh), turning(&log.mesh)] {
                 let views = views(&path);
                 let mut hashes: Vec<u64> = Vec::new();
-                let runs = CacheMode::ALL.map(|mode| {
-                    let settings = settings(&path, Strategy::Event);
-                    let mut engine = Engine::new(tree(&file, mode), NullSink, settings).expect("a whole file");
-                    let mut run = Run { reads: Vec::new(), bytes: Vec::new() };
-                    let (mut reads, mut frame) = (0, 0);
-                    replay(&mut engine, &views, |report, engine| {
-                        reads += report.pages.reads;
-                        run.reads.push(reads as f64);
-                        run.bytes.push(engine.tree().node_bytes() as f64 / 1e6);
-                        if frame == hashes.len() {
-                            hashes.push(report.cut_hash);
-                        }
-                        assert_eq!(hashes[frame], report.cut_hash, "modes differ in what they show");
-                        frame += 1;
-                    });
-                    run
+                let mut runs = CacheMode::ALL.map(|mode| {
+                    let engine = Engine::new(tree(&file, mode), NullSink, settings(&path, Strategy::Event));
+                    run(mode.name(), engine.expect("a whole file"), &views, &mut hashes)
                 });
-                table(&path.name, &runs);
                 if order == QueueOrder::default() && partition == 20 {
                     draw(model, &path.name, &runs);
                 }
+                let half = (mean(&runs[2].bytes) * 0.5e6) as u64;
+                let mut all: Vec<Run> = runs.iter_mut().map(std::mem::take).collect();
+                for (share, name) in [(1.5, "p-cc in 3/4"), (1.0, "p-cc in 1/2"), (0.5, "p-cc in 1/4")] {
+                    let limit = ((half as f64 * share) as u64).max(file.least_memory());
+                    let limited = mt_partition::Settings {
+                        cache: CacheMode::PCc,
+                        memory: Memory::new(limit),
+                        reader: None,
+                    };
+                    let tree = MtTree::new(file.clone(), limited).expect("enough memory");
+                    let engine = Engine::new(tree, NullSink, settings(&path, Strategy::Event));
+                    all.push(run(name, engine.expect("a whole file"), &views, &mut hashes));
+                }
+                table(&path.name, &all);
             }
         }
     }
 }
 
-fn table(path: &str, runs: &[Run; 4]) {
-    let mean = |values: &[f64]| values.iter().sum::<f64>() / values.len() as f64;
-    let reads = runs.each_ref().map(|run| run.reads.last().copied().unwrap_or(0.0));
-    let bytes = runs.each_ref().map(|run| mean(&run.bytes));
-    for (mode, (reads, bytes)) in CacheMode::ALL.iter().zip(reads.iter().zip(bytes)) {
-        println!("  {path}, {:5}: {reads:7} reads, {bytes:7.3} MB on average", mode.name());
-    }
-    println!(
-        "  {path}: P,C : P,CC reads {:.2}, memory {:.2}; P,C : NP,NC memory {:.2}, reads {:.3}",
-        reads[3] / reads[2],
-        bytes[3] / bytes[2],
-        bytes[3] / bytes[0],
-        reads[3] / reads[0]
-    );
+/// Replays a path, and compares its cuts with those of other modes.
+fn run(
+    name: &'static str,
+    mut engine: Engine<MtTree, NullSink>,
+    views: &[View],
+    hashes: &mut Vec<u64>,
+) -> Run {
+    let mut run = Run { name, ..Run::default() };
+    let (mut reads, mut frame) = (0, 0);
+    replay(&mut engine, views, |report, engine| {
+        reads += report.pages.reads;
+        run.reads.push(reads as f64);
+        run.bytes.push(engine.tree().node_bytes() as f64 / 1e6);
+        if frame == hashes.len() {
+            hashes.push(report.cut_hash);
+        }
+        assert_eq!(hashes[frame], report.cut_hash, "modes differ in what they show");
+        frame += 1;
+    });
+    run
 }
 
-fn draw(model: &str, path: &str, runs: &[Run; 4]) {
+fn mean(values: &[f64]) -> f64 {
+    values.iter().sum::<f64>() / values.len() as f64
+}
+
+fn table(path: &str, runs: &[Run]) {
+    let figures = |run: &Run| (run.reads.last().copied().unwrap_or(0.0), mean(&run.bytes));
+    let (least, conservative) = (figures(&runs[0]), figures(&runs[2]));
+    for run in runs {
+        let (reads, bytes) = figures(run);
+        println!(
+            "  {path}, {:11}: {reads:7} reads, {bytes:7.3} MB on average; of NP,NC {:.3} and {:.2}, of P,CC {:.2} and {:.2}",
+            run.name,
+            reads / least.0,
+            bytes / least.1,
+            reads / conservative.0,
+            bytes / conservative.1
+        );
+    }
+}
+
+fn draw(model: &str, path: &str, runs: &[Run]) {
     let plot = |title: String, y_label, values: fn(&Run) -> &Vec<f64>| {
-        let names = ["NP,NC", "P,NC", "P,CC", "P,C"];
-        let series: Vec<Series> = (0..4)
-            .map(|i| Series { name: names[i], values: values(&runs[i]), colour: i })
-            .collect();
+        let names = ["NP,NC", "P,NC", "P,CC", "P,C", "P, by status"];
+        let series: Vec<Series> =
+            (0..5).map(|i| Series { name: names[i], values: values(&runs[i]), colour: i }).collect();
         let plot = Plot { title: &title, x_label: "frame", y_label, ..Plot::default() };
         curves(&plot, &series).expect("curves can be drawn")
     };

@@ -59,13 +59,15 @@ fn folder() -> PathBuf {
 /// The hierarchy of a model, kept between runs: delete the folder after changing the construction.
 fn model_log(name: &str) -> Option<CollapseLog> {
     let kept = folder().join(format!("{name}.log"));
-    let mesh = PathBuf::from(concat!(env!("CARGO_MANIFEST_DIR"), "/../shared/data/meshes")).join(format!("{name}.ply"));
+    let mesh = PathBuf::from(concat!(env!("CARGO_MANIFEST_DIR"), "/../shared/data/meshes"))
+        .join(format!("{name}.ply"));
     if !mesh.exists() {
         return None;
     }
     Some(read_log(&kept).unwrap_or_else(|_| {
         let mesh = mesh_io::read(&[mesh], &mut |_, _| {}).expect("a mesh");
-        let (log, _) = simplify::build(mesh, &simplify::Options::default(), &mut |_, _| {}).expect("a valid mesh");
+        let (log, _) =
+            simplify::build(mesh, &simplify::Options::default(), &mut |_, _| {}).expect("a valid mesh");
         write_log(&kept, &log).expect("target is writable");
         log
     }))
@@ -89,12 +91,20 @@ fn path(name: &str, mesh: &Mesh, frames: usize, place: impl Fn(f64) -> DVec3) ->
         let camera = Camera::look_at(position, center, DVec3::Y, fov_y, aspect);
         Pose { time: frame as f64 / 60.0, position, orientation: camera.orientation }
     };
-    Path { name: name.to_owned(), units: "units".to_owned(), fov_y, aspect, frames: (0..frames).map(pose).collect() }
+    Path {
+        name: name.to_owned(),
+        units: "units".to_owned(),
+        fov_y,
+        aspect,
+        frames: (0..frames).map(pose).collect(),
+    }
 }
 
 /// From 16 extents away to 0.4, evenly in the logarithm of the distance: the whole path from a speck to a close-up.
 fn near(mesh: &Mesh) -> Path {
-    path("far to near", mesh, 600, |share| DVec3::new(0.2, 0.2, 1.0).normalize() * 16.0 * (0.4_f64 / 16.0).powf(share))
+    path("far to near", mesh, 600, |share| {
+        DVec3::new(0.2, 0.2, 1.0).normalize() * 16.0 * (0.4_f64 / 16.0).powf(share)
+    })
 }
 
 /// Once around at 0.55 extents: a part of the object is in view, and which one changes.
@@ -145,8 +155,9 @@ fn reduction(log: &CollapseLog) {
     let views = views(&path);
     let mean = |sum: u64| sum as f64 / views.len() as f64;
     let settings = settings(&path, Strategy::TopDown);
-    let mut exact = Engine::new(InMemoryTree::new(Arc::new(Hierarchy::new(log).expect("a log"))), NullSink, settings)
-        .expect("nothing can fail in memory");
+    let mut exact =
+        Engine::new(InMemoryTree::new(Arc::new(Hierarchy::new(log).expect("a log"))), NullSink, settings)
+            .expect("nothing can fail in memory");
     let mut triangles = Vec::new();
     replay(&mut exact, &views, |report, _| triangles.push(report.triangles));
     let least = mean(triangles.iter().sum());
@@ -155,7 +166,8 @@ fn reduction(log: &CollapseLog) {
         let start = Instant::now();
         let (file, r) = build(log, &BuildOptions { patch, ..BuildOptions::default() });
         let time = start.elapsed().as_secs_f64();
-        let mut engine = Engine::new(tree(&file, CacheMode::PCc), NullSink, settings).expect("a file that is whole");
+        let mut engine =
+            Engine::new(tree(&file, CacheMode::PCc), NullSink, settings).expect("a file that is whole");
         let (mut sum, mut ratios) = (0, Vec::new());
         replay(&mut engine, &views, |report, _| {
             let before: u64 = triangles[ratios.len()];
@@ -196,7 +208,8 @@ fn selection(log: &CollapseLog) {
                 Engine::new(InMemoryTree::new(hierarchy.clone()), NullSink, settings).expect("in memory")
             });
             let grouped = least(&views, || {
-                let mut engine = Engine::new(tree(&file, CacheMode::PCc), NullSink, settings).expect("a whole file");
+                let mut engine =
+                    Engine::new(tree(&file, CacheMode::PCc), NullSink, settings).expect("a whole file");
                 // Everything that the path needs is in memory before the clock is looked at, and stays: the cut has been
                 // everywhere, and nothing is let go of while something of its partition is in the cut.
                 replay(&mut engine, &views[..1], |_, _| {});
@@ -248,7 +261,8 @@ fn least<T: VertexTree>(views: &[View], engine: impl Fn() -> Engine<T, NullSink>
     }
     // The first frame unfolds the whole cut.
     let frames = &least[1..];
-    let mean = |f: &dyn Fn(&FrameReport) -> u64| frames.iter().map(f).sum::<u64>() as f64 / frames.len() as f64;
+    let mean =
+        |f: &dyn Fn(&FrameReport) -> u64| frames.iter().map(f).sum::<u64>() as f64 / frames.len() as f64;
     Figures {
         ns: mean(&|r| r.select.as_nanos() as u64),
         triangles: mean(&|r| r.triangles),

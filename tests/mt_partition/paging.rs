@@ -113,7 +113,7 @@ fn modes_differ_in_what_they_keep_only() {
     let file = open(MemorySource::new("ball.mt", bytes(5)));
     let mut engines = CacheMode::ALL.map(|mode| engine(&file, mode, Memory::default(), NullSink));
     let mut walk = Walk::new(8, 300.0);
-    let (mut sums, mut reads) = ([0; 4], [0; 4]);
+    let (mut sums, mut reads) = ([0; 5], [0; 5]);
     for _ in 0..300 {
         let views = walk.step();
         for (at, engine) in engines.iter_mut().enumerate() {
@@ -129,13 +129,13 @@ fn modes_differ_in_what_they_keep_only() {
             sums[at] += engine.tree().node_bytes();
         }
         let hashes = engines.each_ref().map(|engine| engine.front().cut_hash());
-        assert_eq!(hashes, [hashes[0]; 4]);
+        assert_eq!(hashes, [hashes[0]; 5]);
     }
-    let [np_nc, p_nc, p_cc, p_c] = sums;
+    let [np_nc, p_nc, p_cc, p_c, p_status] = sums;
     assert_eq!(np_nc, p_nc, "neither keeps more than the cut");
-    assert!(p_nc < p_c && p_c < p_cc, "{sums:?}");
-    let [np_nc, p_nc, p_cc, p_c] = reads;
-    assert!(p_cc <= p_c && p_c < p_nc && p_c < np_nc, "{reads:?}");
+    assert!(p_nc < p_c && p_c < p_cc && p_nc < p_status && p_status < p_cc, "{sums:?}");
+    let [np_nc, p_nc, p_cc, p_c, p_status] = reads;
+    assert!(p_cc <= p_status && p_status < p_c && p_c < p_nc && p_c < np_nc, "{reads:?}");
 }
 
 /// Reads that fail, end early, bring flipped bits or take long: frames go on, faults are counted, and when the store has

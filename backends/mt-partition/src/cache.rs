@@ -1,4 +1,4 @@
-//! Which nodes stay in memory: the four modes of the paper's section 5, and the layers of section 4.3.
+//! Which nodes stay in memory: the four modes of the paper's section 5, the layers of section 4.3, and a fifth mode.
 //!
 //! The cut of a multi-triangulation is a set of arcs, those whose upper node is active and whose lower one is not. A node
 //! is *in the cut* while it is the upper or the lower node of one of them.
@@ -13,10 +13,17 @@
 //! ```
 //!
 //! The paper's equation 2 takes a minimum for `T_max`, and the second half of its equation 3 keeps nodes below `l_max`;
-//! its text and its figure 3 say what is written here. It also sets the frames of the tuples to the current one wherever
-//! an arc stays in the cut. In other words `f_min = f` and `f_max = f` wherever the partition has any node in the cut, and
-//! the tuple has ever been set: so a count of nodes in the cut takes the place of a walk through the cut in every frame,
-//! and the frame is kept for the minimum and the maximum alone: those of the last frame that brought arcs.
+//! its text and its figure 3 say what is written here. It leaves open what becomes of the layers of arcs that stay in the
+//! cut, for which only the frames are set to the current one:
+//!
+//! * The frames are the current one wherever the partition has a node in the cut and the tuple has ever been set. A count
+//!   of nodes in the cut takes the place of a walk through the cut in every frame.
+//! * If layers were taken from new arcs alone, nodes just below older arcs would go; if they were added up, nodes that the
+//!   cut has long passed would stay, against the paper's figure 3. Here they are the least and the largest layer of the
+//!   partition's nodes in the cut, looked up when something in the partition has changed.
+//!
+//! Layers are a poor sign of what lies below the cut: a node is on a small layer if it has a short path from the source,
+//! wherever the cut is. Whether it has been unfolded is known, and says it exactly: [`CacheMode::PStatus`].
 
 /// What is read at once, and what is kept.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Default)]
@@ -30,11 +37,14 @@ pub enum CacheMode {
     /// Partitions, caching by layers, as above.
     #[default]
     PC,
+    /// Partitions, caching by status, not in the paper: while the cut is in the partition, its folded nodes are kept if it
+    /// has ever come down there, and its active ones if it has ever come up. Fewer reads than by layers.
+    PStatus,
 }
 
 impl CacheMode {
-    /// All of them, in the order of the paper.
-    pub const ALL: [Self; 4] = [Self::NpNc, Self::PNc, Self::PCc, Self::PC];
+    /// All of them, those of the paper first and in its order.
+    pub const ALL: [Self; 5] = [Self::NpNc, Self::PNc, Self::PCc, Self::PC, Self::PStatus];
 
     /// The name on the command line.
     #[must_use]
@@ -44,6 +54,7 @@ impl CacheMode {
             Self::PNc => "p-nc",
             Self::PCc => "p-cc",
             Self::PC => "p-c",
+            Self::PStatus => "p-status",
         }
     }
 
@@ -52,14 +63,6 @@ impl CacheMode {
     pub fn reads_partitions(self) -> bool {
         self != Self::NpNc
     }
-}
-
-/// The layer of one of the two tuples, and the frame in which it was found.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-struct Tuple {
-    /// 0 where the tuple has not been set.
-    frame: u64,
-    layer: u32,
 }
 
 /// What is known of a partition.
@@ -71,39 +74,32 @@ pub(crate) struct PartitionState {
     pub resident: u32,
     /// Whether something has changed since its nodes were last looked through.
     pub is_dirty: bool,
-    min: Tuple,
-    max: Tuple,
+    /// Whether arcs have come into the cut from above, and from below, since the partition was loaded.
+    pub came_down: bool,
+    pub came_up: bool,
+}
+
+/// What the modes ask about a node that is not in the cut.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Passed {
+    pub layer: u32,
+    pub is_active: bool,
 }
 
 impl PartitionState {
-    /// A node of layer `layer` has an arc that came into the cut from above.
-    pub fn came_down(&mut self, frame: u64, layer: u32) {
-        let least = if self.min.frame == frame { self.min.layer.min(layer) } else { layer };
-        self.min = Tuple { frame, layer: least };
-    }
-
-    /// A node of layer `layer` has an arc that came into the cut from below.
-    pub fn came_up(&mut self, frame: u64, layer: u32) {
-        let largest = if self.max.frame == frame { self.max.layer.max(layer) } else { layer };
-        self.max = Tuple { frame, layer: largest };
-    }
-
     /// No node of the partition is left in memory: what comes next starts anew.
     pub fn forget(&mut self) {
-        (self.min, self.max) = Default::default();
+        (self.came_down, self.came_up) = (false, false);
     }
 
-    /// Whether a node that is not in the cut is kept.
-    pub fn keeps(&self, mode: CacheMode, layer: u32) -> bool {
-        let is_set = |tuple: Tuple| tuple.frame > 0;
+    /// Whether a node that is not in the cut is kept; `cut` are the least and the largest layer of those that are.
+    pub fn keeps(&self, mode: CacheMode, cut: [u32; 2], node: Passed) -> bool {
+        let by = |down: bool, up: bool| self.in_cut > 0 && (self.came_down && down || self.came_up && up);
         match mode {
             CacheMode::NpNc | CacheMode::PNc => false,
             CacheMode::PCc => self.in_cut > 0,
-            CacheMode::PC => {
-                self.in_cut > 0
-                    && (is_set(self.min) && layer > self.min.layer
-                        || is_set(self.max) && layer < self.max.layer)
-            }
+            CacheMode::PC => by(node.layer > cut[0], node.layer < cut[1]),
+            CacheMode::PStatus => by(!node.is_active, node.is_active),
         }
     }
 }
@@ -112,32 +108,35 @@ impl PartitionState {
 mod tests {
     use super::*;
 
+    fn kept(partition: &PartitionState, mode: CacheMode, cut: [u32; 2]) -> Vec<u32> {
+        // Active nodes lie above the middle of the cut.
+        let node = |layer| Passed { layer, is_active: 2 * layer < cut[0] + cut[1] };
+        (3..8).filter(|&layer| partition.keeps(mode, cut, node(layer))).collect()
+    }
+
     /// The paper's figure 3: a partition of layers 3 to 7 is loaded when the cut comes down to layers 3 and 4; then the cut
     /// moves on to layers 5 and 6.
     #[test]
     fn the_cut_comes_down() {
         let mut partition = PartitionState { in_cut: 2, resident: 5, ..PartitionState::default() };
-        let kept =
-            |p: &PartitionState| (3..8).filter(|&layer| p.keeps(CacheMode::PC, layer)).collect::<Vec<u32>>();
-        assert_eq!(kept(&partition), [0; 0], "nothing is known yet");
-        partition.came_down(1, 4);
-        partition.came_down(1, 3);
-        assert_eq!(kept(&partition), [4, 5, 6, 7]);
-        partition.came_down(2, 6);
-        partition.came_down(2, 5);
-        assert_eq!(kept(&partition), [6, 7]);
+        assert_eq!(kept(&partition, CacheMode::PC, [3, 4]), [0; 0], "nothing is known yet");
+        partition.came_down = true;
+        assert_eq!(kept(&partition, CacheMode::PC, [3, 4]), [4, 5, 6, 7]);
+        assert_eq!(kept(&partition, CacheMode::PC, [5, 6]), [6, 7]);
+        assert_eq!(kept(&partition, CacheMode::PStatus, [5, 6]), [6, 7]);
+        assert_eq!(kept(&partition, CacheMode::PCc, [5, 6]), [3, 4, 5, 6, 7]);
         partition.in_cut = 0;
-        assert_eq!(kept(&partition), [0; 0], "the cut has gone elsewhere");
+        for mode in CacheMode::ALL {
+            assert_eq!(kept(&partition, mode, [5, 6]), [0; 0], "the cut has gone elsewhere");
+        }
     }
 
     #[test]
     fn the_cut_comes_up() {
-        let mut partition = PartitionState { in_cut: 1, ..PartitionState::default() };
-        partition.came_up(4, 5);
-        partition.came_up(4, 6);
-        let kept = |mode| (3..8).filter(|&layer| partition.keeps(mode, layer)).collect::<Vec<u32>>();
+        let partition = PartitionState { in_cut: 1, resident: 5, came_up: true, ..PartitionState::default() };
+        let kept = |mode| kept(&partition, mode, [5, 6]);
         assert_eq!(kept(CacheMode::PC), [3, 4, 5], "a maximum, not a minimum, and what is above it");
-        assert_eq!(kept(CacheMode::PCc), [3, 4, 5, 6, 7]);
+        assert_eq!(kept(CacheMode::PStatus), [3, 4, 5]);
         assert_eq!(kept(CacheMode::PNc), [0; 0]);
     }
 }

@@ -14,7 +14,7 @@ use std::sync::Arc;
 use rustc_hash::{FxHashMap, FxHashSet};
 use vertex_tree::{NONE, NodeId, PageStats};
 
-use crate::cache::{CacheMode, PartitionState};
+use crate::cache::{CacheMode, PartitionState, Passed};
 use crate::file::MtFile;
 use crate::memory::Memory;
 use crate::reader::{Answer, Line, Reader};
@@ -50,10 +50,8 @@ pub(crate) struct Paging {
     partitions: Vec<PartitionState>,
     /// For each node, its arcs in the cut.
     links: Vec<u32>,
+    active: Vec<bool>,
     frame: u64,
-    /// Counts the frames that ended with nothing on its way: a frame that waits for pages and is repeated is one to the
-    /// cache mode.
-    round: u64,
     /// By the node that is to change.
     groups: FxHashMap<u32, Group>,
     /// By what is read, a partition or a node: the nodes that wait for it.
@@ -92,8 +90,8 @@ impl Paging {
             residents: Residents::new(file.nodes(), memory),
             partitions: vec![PartitionState::default(); file.partitions.len() - 1],
             links: vec![0; file.nodes() as usize],
+            active: vec![false; file.nodes() as usize],
             frame: 0,
-            round: 1,
             groups: FxHashMap::default(),
             reads: FxHashMap::default(),
             reserved: FxHashSet::default(),
@@ -155,20 +153,20 @@ impl Paging {
         }
     }
 
-    /// An arc has come into the cut: the tuples of the partitions of both of its nodes follow.
+    /// An arc of the node has come into the cut.
     fn note(&mut self, node: u32, change: Change) {
-        let Some(layer) = self.residents.get(node).map(crate::record::Record::layer) else { return };
         let partition = self.file.partition_of(node);
         let state = &mut self.partitions[partition as usize];
         match change {
-            Change::Unfold => state.came_down(self.round, layer),
-            Change::Fold => state.came_up(self.round, layer),
+            Change::Unfold => state.came_down = true,
+            Change::Fold => state.came_up = true,
         }
         self.mark(partition);
     }
 
     /// A node in memory has been unfolded, and so have `above` before, or folded: arcs come into the cut and leave it.
     pub fn changed(&mut self, node: u32, change: Change, above: &[u32], below: &[u32], arcs: u32) {
+        self.active[node as usize] = change == Change::Unfold;
         let (gain, loss) = match change {
             Change::Unfold => (below, above),
             Change::Fold => (above, below),
@@ -370,7 +368,6 @@ impl Paging {
         self.unanswered_frames = if self.groups.is_empty() { 0 } else { self.unanswered_frames + 1 };
         if self.groups.is_empty() || self.unanswered_frames > PATIENCE {
             self.unanswered_frames = 0;
-            self.round += 1;
             self.clean();
         }
         let mut stats = std::mem::take(&mut self.stats);
@@ -400,15 +397,18 @@ impl Paging {
             self.partitions[partition as usize].is_dirty = false;
             let nodes =
                 self.file.partitions[partition as usize]..self.file.partitions[partition as usize + 1];
+            let state = self.partitions[partition as usize];
+            let layer = |&n: &u32| self.residents.get(n).map(crate::record::Record::layer);
+            let in_cut = nodes.clone().filter(|&n| self.links[n as usize] > 0);
+            let layers = in_cut.filter_map(|n| layer(&n));
+            let cut = [layers.clone().min().unwrap_or(0), layers.max().unwrap_or(0)];
             let mut is_postponed = false;
             for node in nodes {
-                if self.links[node as usize] > 0 {
-                    continue;
-                }
                 let Some(layer) = self.residents.get(node).map(crate::record::Record::layer) else {
                     continue;
                 };
-                if self.partitions[partition as usize].keeps(self.mode, layer) {
+                let passed = Passed { layer, is_active: self.active[node as usize] };
+                if self.links[node as usize] > 0 || state.keeps(self.mode, cut, passed) {
                     continue;
                 }
                 if self.residents.is_free(node, self.frame) {

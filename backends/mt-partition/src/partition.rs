@@ -9,10 +9,11 @@ use crate::graph::Graph;
 /// In which order pairs of partitions are merged.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Default)]
 pub enum QueueOrder {
-    /// The pair with the fewest connecting arcs first, as printed.
-    Increasing,
-    /// The pair with the most connecting arcs first, as the paper's second observation suggests.
+    /// The pair with the fewest connecting arcs first, as printed: fuller partitions and fewer reads.
     #[default]
+    Increasing,
+    /// The pair with the most connecting arcs first, as the paper's second observation suggests. Partitions that are full
+    /// early leave small ones between them.
     Decreasing,
 }
 
