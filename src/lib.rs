@@ -74,6 +74,7 @@ pub mod front;
 mod frustum;
 pub mod mesh_io;
 pub mod motion;
+pub mod objects;
 pub mod oracle;
 mod packed;
 mod parallel;
