@@ -114,20 +114,39 @@ pub(crate) fn certainly<const WANTED: bool>(block: &Block, lenses: &[Lens]) -> [
     certain
 }
 
+/// Speeds rounded up to f32, or one that f32 can not hold would be none at all.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Rates {
+    rho: f32,
+    omega: f32,
+    kappa: f32,
+}
+
+impl Rates {
+    pub fn new(speed: &Speed) -> Self {
+        let up = |x: f64| if x > 0.0 { (x as f32).next_up() } else { 0.0 };
+        Self { rho: up(speed.rho), omega: up(speed.omega), kappa: up(speed.kappa) }
+    }
+}
+
 /// For each entry of a block, how many frames at full speed must pass before its status can have to change: a boundary
-/// node's where the tag is 0, otherwise a collapsible one's. Never late; 0 where the filter can not say.
+/// node's where the tag is even, otherwise a collapsible one's. Never late; 0 where the filter can not say.
 ///
-/// The time bounds of [`Criterion::earliest_unfold`] and [`Criterion::earliest_fold`], taken at the ends of the error
-/// band. `f` is computed from both ends of the band of `p^2`, as near the axis the root magnifies it.
+/// The time bounds of [`Criterion::earliest_unfold`] and [`Criterion::earliest_fold`], taken at that end of the error
+/// band which makes them earlier: for an unfolding the nearer one, for a folding the farther one. `p` is taken from that
+/// end of the band of `p^2`, as near the axis the root magnifies it.
+///
+/// Whether the apex or the line is the nearest part of the cone is certain where `q = a cos beta + p sin beta` is far
+/// enough from 0. The other end of the band of `p` is at most `sqrt(2 band) < 0.0028 (M + t)` away.
 #[inline(always)]
-pub(crate) fn earliest(block: &Block, lenses: &[Lens], speed: &Speed) -> [f32; LANES] {
-    // Rounded up, or a speed that f32 can not hold would be none at all.
-    let up = |x: f64| if x > 0.0 { (x as f32).next_up() } else { 0.0 };
-    let (rho, omega, kappa) = (up(speed.rho), up(speed.omega), up(speed.kappa));
-    let mut folds = [0.0_f32; LANES];
-    let mut unfolds = [f32::INFINITY; LANES];
+pub(crate) fn earliest(block: &Block, lenses: &[Lens], rates: &Rates) -> [f32; LANES] {
+    let &Rates { rho, omega, kappa } = rates;
+    let per_rho = 1.0 / rate(rho);
+    let mut earliest: [f32; LANES] =
+        std::array::from_fn(|i| if block.tag[i] & 1 == 0 { f32::INFINITY } else { 0.0 });
     for lens in lenses {
         for i in 0..LANES {
+            let unfolds = block.tag[i] & 1 == 0;
             let (x, y, z) = (block.x[i] - lens.eye[0], block.y[i] - lens.eye[1], block.z[i] - lens.eye[2]);
             let (r, eps) = (block.radius[i], block.eps[i]);
             let d2 = x * x + y * y + z * z;
@@ -137,35 +156,27 @@ pub(crate) fn earliest(block: &Block, lenses: &[Lens], speed: &Speed) -> [f32; L
             let margin = MARGIN * (lens.eye_length + d + r) + TINY;
             let coarse_band = margin + MARGIN * reach;
             let a = x * lens.direction[0] + y * lens.direction[1] + z * lens.direction[2];
-            let p2 = d2 - a * a;
             let t = d + r + margin;
             let band = VISIBLE_BAND * t * (lens.eye_length + t);
-            let p_low = larger(p2 - band, 0.0).sqrt();
-            let p_high = (p2 + band).sqrt();
+            let p = larger(d2 - a * a + if unfolds { -band } else { band }, 0.0).sqrt();
             // Behind the apex, the distance from the cone is that from the eye, and never less than that from its line.
-            let line_low = p_low * lens.cos_beta - a * lens.sin_beta;
-            let line_high = p_high * lens.cos_beta - a * lens.sin_beta;
-            let behind = a * lens.cos_beta + p_high * lens.sin_beta < -margin;
-            let ahead = a * lens.cos_beta + p_low * lens.sin_beta > margin;
-            let f_low = if behind { d } else { line_low };
-            let f_high = if ahead { line_high } else { d };
+            let line = p * lens.cos_beta - a * lens.sin_beta;
+            let q = a * lens.cos_beta + p * lens.sin_beta;
+            let unsure = margin + 0.0028 * (lens.eye_length + t);
+            let is_line = if unfolds { q >= -unsure } else { q > unsure };
+            let f = if is_line { line } else { d };
 
-            let sideways = rate(rho + omega * (d + margin));
-            let towards = rate(rho + kappa * reach_slope);
-            let appears = frames(f_low - r - 2.0 * margin, sideways);
-            let disappears = frames(r - f_high - 2.0 * margin, sideways);
-            let coarse = frames(d - reach - 2.0 * coarse_band, towards);
-            let fine = frames(reach - d - 2.0 * coarse_band, towards);
-            let outside = frames(r - d - 2.0 * margin, rate(rho));
-            unfolds[i] = smaller(unfolds[i], larger(appears, coarse));
-            folds[i] = larger(folds[i], larger(outside, smaller(disappears, fine)));
+            let sign = if unfolds { 1.0 } else { -1.0 };
+            let sideways = frames(sign * (f - r) - 2.0 * margin, rate(rho + omega * (d + margin)));
+            let towards = frames(sign * (d - reach) - 2.0 * coarse_band, rate(rho + kappa * reach_slope));
+            let outside = larger((r - d - 2.0 * margin) * per_rho * (1.0 - 1.0 / 1_048_576.0), 0.0);
+            let both = larger(sideways, towards);
+            let either = larger(outside, smaller(sideways, towards));
+            earliest[i] = if unfolds { smaller(earliest[i], both) } else { larger(earliest[i], either) };
         }
     }
-    std::array::from_fn(|i| {
-        let frames = if block.tag[i] == 0 { unfolds[i] } else { folds[i] };
-        // It may be the division that has overflown, not the time that is infinite.
-        if frames == f32::INFINITY { f32::MAX } else { frames }
-    })
+    // It may be the division that has overflown, not the time that is infinite.
+    earliest.map(|frames| smaller(frames, f32::MAX))
 }
 
 /// A rate, and more than its computation and a division by it can have lost, also to underflow.
@@ -309,7 +320,7 @@ mod tests {
                 // that a node that should change need not.
                 for fold in [false, true] {
                     block.tag[lane] = u32::from(fold);
-                    let filtered = f64::from(earliest(&block, lenses.as_slice(), &speed)[lane]);
+                    let filtered = f64::from(earliest(&block, lenses.as_slice(), &Rates::new(&speed))[lane]);
                     let exact = if fold {
                         criterion.earliest_fold(&[view], &speed, bounds)
                     } else {

@@ -15,11 +15,11 @@ use multiversion::multiversion;
 use vertex_tree::Bounds;
 
 use super::{Flips, Frame};
-use crate::filter::{Lens, Lenses, earliest};
+use crate::filter::{Lens, Lenses, Rates, earliest};
 use crate::front::Slot;
 use crate::motion::{Motion, Odometer, Speed, Travel};
 use crate::packed::{Block, LANES};
-use crate::queue::{Event, EventQueue, Kind, TICKS_PER_FRAME};
+use crate::queue::{Event, EventQueue, HORIZON, Kind, OnClock, TICKS_PER_FRAME};
 use crate::view::View;
 
 /// Clocks with `omega` taken down, and as many with `rho` taken down.
@@ -33,8 +33,6 @@ pub(crate) struct EventDriven {
     clock: usize,
     /// Nodes watched since the last frame's events were scheduled.
     fresh: Vec<Event>,
-    /// Kept between frames for its allocation.
-    due: Vec<Event>,
 }
 
 /// Declared speeds of a clock.
@@ -55,42 +53,40 @@ impl EventDriven {
             odometers: [Odometer::default(); CLOCKS],
             clock: SKEWED as usize,
             fresh: Vec::new(),
-            due: Vec::new(),
         }
     }
 
     pub fn find(&mut self, frame: &Frame, before: &[View], flips: &mut Flips) {
         // Nodes may have come to be watched outside of a frame: the roots.
         self.settle(frame);
-        self.due.clear();
         match frame.motion {
-            Motion::Rest => self.queue.take_pressing(&mut self.due),
+            Motion::Rest => self.queue.take_pressing(),
             Motion::Frames(_) => self.advance(frame, before),
-            Motion::Unbounded => self.queue.take_all(&mut self.due),
+            Motion::Unbounded => self.queue.take_all(),
         }
-        if self.due.is_empty() {
-            return;
-        }
-        flips.tests += self.due.len() as u64;
-        let due = std::mem::take(&mut self.due);
-        self.process(&due, frame, |event, _| match event.kind() {
-            Kind::Unfold => flips.unfold.push(event.slot),
-            Kind::Fold => flips.fold.push(event.slot),
+        let Flips { unfold, fold, tests } = flips;
+        let next = |queue: &mut EventQueue, due: &mut [Event; LANES]| {
+            let count = queue.next_due(due);
+            *tests += count as u64;
+            count
+        };
+        self.process(frame, next, |event, _| match event.kind() {
+            Kind::Unfold => unfold.push(event.slot),
+            Kind::Fold => fold.push(event.slot),
         });
-        self.due = due;
     }
 
     /// Moves all clocks, and chooses the one that the motion fits.
     fn advance(&mut self, frame: &Frame, before: &[View]) {
         let Some(travel) = Travel::between(before, frame.views) else {
-            return self.queue.take_all(&mut self.due);
+            return self.queue.take_all();
         };
         let mut least = f64::INFINITY;
         for clock in 0..CLOCKS {
             let speed = skew(&frame.speed, clock);
             match self.odometers[clock].advance_by(&speed, &travel) {
                 Motion::Frames(frames) => {
-                    self.queue.advance(clock, self.odometers[clock].now(), &mut self.due);
+                    self.queue.advance(clock, self.odometers[clock].now());
                     // What the clock allows for in the time that it takes this motion for, at a typical distance.
                     let share = speed.rho / frame.speed.rho + speed.omega / frame.speed.omega;
                     if frames * share < least {
@@ -99,7 +95,7 @@ impl EventDriven {
                     }
                 }
                 Motion::Rest => {}
-                Motion::Unbounded => self.queue.take_clock(clock, &mut self.due),
+                Motion::Unbounded => self.queue.take_clock(clock),
             }
         }
     }
@@ -108,20 +104,31 @@ impl EventDriven {
     pub fn settle(&mut self, frame: &Frame) {
         let mut fresh = std::mem::take(&mut self.fresh);
         fresh.retain(|event| self.queue.is_valid(event));
-        let clock = self.clock;
+        let mut left = &fresh[..];
+        let next = |_: &mut EventQueue, due: &mut [Event; LANES]| {
+            let (now, later) = left.split_at(left.len().min(LANES));
+            due[..now.len()].copy_from_slice(now);
+            left = later;
+            now.len()
+        };
         // A node that no view wants is active where another needs it: its time to fold is the next motion.
-        self.process(&fresh, frame, |event, queue| queue.schedule_ticks(clock, 0, *event));
+        self.process(frame, next, |event, queue| queue.schedule_ticks(0, *event));
         fresh.clear();
         self.fresh = fresh;
     }
 
-    /// Tests events, calls `flip` for those whose nodes should change and schedules the others.
-    fn process(&mut self, due: &[Event], frame: &Frame, flip: impl FnMut(&Event, &mut EventQueue)) {
-        let clock = self.clock;
-        let bench = Bench { frame, speed: skew(&frame.speed, clock), clock };
+    /// Tests the events that `next` puts into its second argument, as many as it returns, until it returns 0. Calls `flip`
+    /// for those whose nodes should change and schedules the others.
+    fn process(
+        &mut self,
+        frame: &Frame,
+        next: impl FnMut(&mut EventQueue, &mut [Event; LANES]) -> usize,
+        flip: impl FnMut(&Event, &mut OnClock),
+    ) {
+        let bench = Bench { frame, speed: skew(&frame.speed, self.clock), clock: self.clock };
         match Lenses::new(frame.criterion, frame.views) {
-            Some(lenses) => process(due, lenses.as_slice(), &bench, &mut self.queue, flip),
-            None => process_plainly(due, &bench, &mut self.queue, flip),
+            Some(lenses) => process(&mut self.queue, lenses.as_slice(), &bench, next, flip),
+            None => process_plainly(&mut self.queue, &bench, next, flip),
         }
     }
 
@@ -143,67 +150,99 @@ impl EventDriven {
     }
 }
 
-/// What an event is tested with, and where it waits after that.
+/// What events are tested with.
 struct Bench<'a> {
     frame: &'a Frame<'a>,
-    /// Of the clock.
-    speed: Speed,
+    /// The clock that they wait on after that, and its speed.
     clock: usize,
+    speed: Speed,
 }
 
-#[multiversion(targets("x86_64+avx2", "x86_64+sse4.1"))]
+impl Bench<'_> {
+    /// Tests one event in f64.
+    fn test(&self, event: &Event, queue: &mut OnClock, flip: &mut impl FnMut(&Event, &mut OnClock)) {
+        let Self { frame, speed, .. } = self;
+        let frames = match event.kind() {
+            Kind::Unfold => frame.criterion.earliest_unfold(frame.views, speed, &event.bounds),
+            Kind::Fold => frame.criterion.earliest_fold(frame.views, speed, &event.bounds),
+        };
+        // A positive bound says that nothing can have changed yet; only then is the predicate spared.
+        if frames == 0.0 && frame.unfold(&event.bounds) == (event.kind() == Kind::Unfold) {
+            flip(event, queue);
+        } else {
+            queue.schedule(frames, *event);
+        }
+    }
+}
+
+/// Events to be tested together.
+struct Batch {
+    events: [Event; LANES],
+    count: usize,
+    block: Block,
+}
+
+impl Batch {
+    const EMPTY: Self = Self { events: [Event::BLANK; LANES], count: 0, block: Block::EMPTY };
+
+    #[inline(always)]
+    fn fill(&mut self, count: usize) {
+        self.count = count;
+        for (lane, event) in self.events.iter().enumerate() {
+            self.block.set(lane, &event.bounds, event.tag());
+        }
+    }
+}
+
+#[multiversion(targets("x86_64+avx2+lzcnt+bmi1+bmi2", "x86_64+sse4.1"))]
 fn process(
-    due: &[Event],
+    queue: &mut EventQueue,
     lenses: &[Lens],
     bench: &Bench,
-    queue: &mut EventQueue,
-    mut flip: impl FnMut(&Event, &mut EventQueue),
+    mut next: impl FnMut(&mut EventQueue, &mut [Event; LANES]) -> usize,
+    mut flip: impl FnMut(&Event, &mut OnClock),
 ) {
-    let mut block = Block::EMPTY;
-    for events in due.chunks(LANES) {
-        for (lane, event) in events.iter().enumerate() {
-            block.set(lane, &event.bounds, u32::from(event.kind() == Kind::Fold));
-        }
-        let frames = earliest(&block, lenses, &bench.speed);
-        for (event, &frames) in events.iter().zip(&frames) {
-            if frames > 0.0 {
-                // To multiply by a power of two is exact.
-                queue.schedule_ticks(bench.clock, (frames * TICKS_PER_FRAME as f32) as u32, *event);
+    let rates = Rates::new(&bench.speed);
+    let mut batches = [const { Batch::EMPTY }; 2];
+    let [batch, following] = &mut batches;
+    let (mut batch, mut following) = (batch, following);
+    let count = next(queue, &mut batch.events);
+    batch.fill(count);
+    while batch.count > 0 {
+        // One ahead: what has just been written member by member can not be read as a vector at once.
+        let count = next(queue, &mut following.events);
+        following.fill(count);
+        let frames = earliest(&batch.block, lenses, &rates);
+        // To multiply by a power of two is exact; what is further than the horizon makes no difference.
+        let ticks =
+            frames.map(|frames| (frames * TICKS_PER_FRAME as f32).min(HORIZON as f32 / 2.0) as i32 as u32);
+        let mut queue = queue.on(bench.clock);
+        for (lane, event) in batch.events[..batch.count].iter().enumerate() {
+            if frames[lane % LANES] > 0.0 {
+                queue.schedule_ticks(ticks[lane % LANES], *event);
             } else {
-                test(event, bench, queue, &mut flip);
+                bench.test(event, &mut queue, &mut flip);
             }
         }
+        std::mem::swap(&mut batch, &mut following);
     }
 }
 
 /// Without the filter, for more views than it takes.
 fn process_plainly(
-    due: &[Event],
-    bench: &Bench,
     queue: &mut EventQueue,
-    mut flip: impl FnMut(&Event, &mut EventQueue),
-) {
-    for event in due {
-        test(event, bench, queue, &mut flip);
-    }
-}
-
-/// Tests one event in f64.
-fn test(
-    event: &Event,
     bench: &Bench,
-    queue: &mut EventQueue,
-    flip: &mut impl FnMut(&Event, &mut EventQueue),
+    mut next: impl FnMut(&mut EventQueue, &mut [Event; LANES]) -> usize,
+    mut flip: impl FnMut(&Event, &mut OnClock),
 ) {
-    let Bench { frame, speed, clock } = bench;
-    let frames = match event.kind() {
-        Kind::Unfold => frame.criterion.earliest_unfold(frame.views, speed, &event.bounds),
-        Kind::Fold => frame.criterion.earliest_fold(frame.views, speed, &event.bounds),
-    };
-    // A positive bound says that nothing can have changed yet; only then is the predicate spared.
-    if frames == 0.0 && frame.unfold(&event.bounds) == (event.kind() == Kind::Unfold) {
-        flip(event, queue);
-    } else {
-        queue.schedule(*clock, frames, *event);
+    let mut events = [Event::BLANK; LANES];
+    loop {
+        let count = next(queue, &mut events);
+        for event in &events[..count] {
+            bench.test(event, &mut queue.on(bench.clock), &mut flip);
+        }
+        if count == 0 {
+            return;
+        }
     }
 }
