@@ -271,7 +271,7 @@ impl<T: VertexTree, M: MeshSink> Engine<T, M> {
             self.kappa = kappa;
         }
         let speed = Speed { rho: self.settings.rho, omega: self.settings.omega, kappa: self.kappa };
-        let mut motion = self.odometer.advance(&speed, &self.before, &self.views);
+        let mut motion = self.odometer.advance(&speed.into(), &self.before, &self.views);
         if redeclared {
             motion = crate::motion::Motion::Unbounded;
         }

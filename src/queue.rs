@@ -280,7 +280,7 @@ impl OnClock<'_> {
     }
 }
 
-/// The queue. Times are frames at full speed on an [`Odometer`](crate::motion::Odometer), one for each clock.
+/// The queue. Times are frames on an [`Odometer`](crate::motion::Odometer), one for each clock.
 #[derive(Debug)]
 pub struct EventQueue {
     wheels: Vec<Wheel>,
@@ -415,6 +415,12 @@ impl EventQueue {
     pub fn advance(&mut self, clock: usize, now: f64) {
         self.take_pressing();
         self.wheels[clock].advance(now, &mut self.ripe);
+    }
+
+    /// Whether no event waits on a clock.
+    #[must_use]
+    pub fn is_idle(&self, clock: usize) -> bool {
+        self.wheels[clock].occupied == [0; LEVELS]
     }
 
     /// Lets every event on one clock come up: for a motion that its speeds do not cover.

@@ -6,7 +6,7 @@ use std::collections::btree_map::Entry;
 use foldfront::Bounds;
 use foldfront::criterion::Criterion;
 use foldfront::front::Slot;
-use foldfront::motion::{Motion, Odometer, Speed};
+use foldfront::motion::{Course, Motion, Odometer};
 use foldfront::queue::{DUE, Event, EventQueue, HORIZON, Kind, TICKS_PER_FRAME};
 use foldfront::view::View;
 use glam::DVec3;
@@ -182,15 +182,18 @@ proptest! {
         eps in prop_oneof![Just(0.0_f32), 0.0..0.01_f32, 0.0..0.5_f32],
         sphere_size in any::<bool>(),
         seed in any::<u64>(),
-        (rho, omega, kappa) in (
+        heading in prop::array::uniform3(-1.0..1.0_f64),
+        (rho, stray, omega, kappa) in (
             prop_oneof![Just(0.0), 0.001..0.5],
+            prop_oneof![Just(0.0), 0.0001..0.5],
             prop_oneof![Just(0.0), 0.0001..0.1],
             prop_oneof![Just(0.0), 0.01..5.0],
         ),
     ) {
         let bounds = Bounds { center, radius, eps };
         let criterion = if sphere_size { Criterion::SphereSize } else { Criterion::ScreenError };
-        let speed = Speed { rho, omega, kappa };
+        let heading = DVec3::from(heading).normalize_or_zero();
+        let course = Course { heading, rho, stray, omega, kappa };
         let mut random = Random(seed);
         let mut views = vec![random.view(), random.view()];
         if random.unit() < 0.5 {
@@ -201,16 +204,16 @@ proptest! {
         let mut deadline = 0.0;
         for _ in 0..300 {
             let bound = if active {
-                criterion.earliest_fold(&views, &speed, &bounds)
+                criterion.earliest_fold(&views, &course, &bounds)
             } else {
-                criterion.earliest_unfold(&views, &speed, &bounds)
+                criterion.earliest_unfold(&views, &course, &bounds)
             };
             deadline = f64::max(deadline, clock.now() + bound);
             let before = views.clone();
             for view in &mut views {
-                random.step(view, &speed, center);
+                random.step(view, &course, center);
             }
-            match clock.advance(&speed, &before, &views) {
+            match clock.advance(&course, &before, &views) {
                 Motion::Rest => prop_assert_eq!(criterion.unfold(&views, &bounds), active),
                 Motion::Unbounded => deadline = 0.0,
                 Motion::Frames(_) => {}
@@ -255,17 +258,17 @@ impl Random {
     }
 
     /// Moves a view by up to full speed in each way at once, as often as not straight at or away from the centre.
-    fn step(&mut self, view: &mut View, speed: &Speed, center: [f32; 3]) {
+    fn step(&mut self, view: &mut View, course: &Course, center: [f32; 3]) {
         let to_center = (DVec3::from(center.map(f64::from)) - view.eye).normalize_or(DVec3::X);
         let sign = if self.unit() < 0.5 { 1.0 } else { -1.0 };
         let way = if self.unit() < 0.6 { to_center * sign } else { self.direction() };
-        view.eye += way * speed.rho * self.unit();
+        view.eye += course.heading * course.rho * self.unit() + way * course.stray * self.unit();
         let aim = if self.unit() < 0.6 { to_center * sign } else { self.direction() };
         let axis = view.direction.cross(aim);
         if axis.length() > 1e-9 {
-            let turn = glam::DQuat::from_axis_angle(axis.normalize(), speed.omega * self.unit());
+            let turn = glam::DQuat::from_axis_angle(axis.normalize(), course.omega * self.unit());
             view.direction = (turn * view.direction).normalize();
         }
-        view.k = (view.k + speed.kappa * (self.unit() - 0.5) * 2.0).max(1.0);
+        view.k = (view.k + course.kappa * (self.unit() - 0.5) * 2.0).max(1.0);
     }
 }
