@@ -185,6 +185,7 @@ impl<T: VertexTree, M: MeshSink> Objects<T, M> {
             folds: 0,
             forced: 0,
             blocked: 0,
+            carried: 0,
             misses: 0,
             active_nodes: 0,
             triangles: 0,
@@ -222,6 +223,7 @@ fn add(all: &mut FrameReport, report: &FrameReport, number: u64) {
     all.folds += report.folds;
     all.forced += report.forced;
     all.blocked += report.blocked;
+    all.carried += report.carried;
     all.misses += report.misses;
     all.active_nodes += report.active_nodes;
     all.triangles += report.triangles;

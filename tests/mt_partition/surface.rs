@@ -110,7 +110,7 @@ fn every_cut_of_a_closed_surface_is_closed() {
 #[test]
 fn a_surface_with_a_boundary_has_no_other() {
     let log = data::log(bumpy_grid(33, &mut Random(5)));
-    let rim = |v: u32| v % 33 == 0 || v % 33 == 32 || v / 33 == 0 || v / 33 == 32;
+    let rim = |v: u32| [v % 33, v / 33].iter().any(|at| [0, 32].contains(at));
     let file = graph_cut::file(&log, &options(10.0, 20));
     let mut engine = engine(&file, CacheMode::PCc, Memory::default(), StrictMesh::default());
     let mut walk = Walk::new(9, 200.0);

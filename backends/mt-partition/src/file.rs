@@ -155,7 +155,7 @@ impl MtFile {
         let h = &self.header;
         let per = |a: u64, b: u64| a as f64 / b.max(1) as f64;
         let (bytes, triangles) = (self.source.len(), h.triangles);
-        let layers = self.partitions.len() - 1;
+        let partitions = self.partitions.len() - 1;
         vec![
             ("format", "partitioned multi-triangulation, version 1 (backend mt-partition)".to_owned()),
             ("bytes", format!("{bytes} ({:.1} a triangle)", per(bytes, triangles))),
@@ -166,7 +166,7 @@ impl MtFile {
             (
                 "partitions",
                 format!(
-                    "{layers} ({:.1} nodes each, at most {})",
+                    "{partitions} ({:.1} nodes each, at most {})",
                     per(h.nodes, h.partitions),
                     h.partition_limit
                 ),

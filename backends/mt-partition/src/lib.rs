@@ -19,10 +19,10 @@
 //! ```
 //!
 //! A collapse of the log is a node of a directed acyclic graph; an arc from one node to another holds the triangles that
-//! the lower one makes and the upper one takes away ([`versions`]). Nodes are merged until arcs hold about ten triangles
-//! ([`reduce`]), laid out in partitions ([`partition`]), and written to a file that keeps patches with their nodes
-//! ([`format`](mod@format), [`record`]). At run time the displayed mesh is a set of arcs ([`display`]); nodes are read by a
-//! thread ([`reader`]) and let go of by one of four modes ([`cache`]).
+//! the lower one makes and the upper one takes away (`versions`). Nodes are merged until arcs hold about ten triangles
+//! (`reduce`), laid out in partitions (`partition`), and written to a file that keeps patches with their nodes
+//! (`format`, `record`). At run time the displayed mesh is a set of arcs (`display`); nodes are read by a
+//! thread (`reader`) and let go of by one of five modes (`cache`).
 //!
 //! When to prefer it: where drawing and selection should handle patches and not single triangles, and where many objects
 //! share little memory. When not: a node of this graph stands for a dozen collapses, so the cut is coarser, and shows more
