@@ -598,8 +598,25 @@ impl<T: VertexTree, M: MeshSink> Steps<'_, T, M> {
 
     /// Unfolds a boundary node that some view wants, and before it what the backend says it needs. Children that are
     /// wanted too follow.
-    fn unfold(&mut self, noted: Noted) -> Result<(), TreeError> {
-        self.stack.push(Pending::wanted(noted));
+    #[inline(always)]
+    fn unfold(&mut self, (slot, node): Noted) -> Result<(), TreeError> {
+        if !is_boundary(self.front, (slot, node)) {
+            return Ok(());
+        }
+        match self.tree.unfold(node, self.mesh)? {
+            Step::Done => self.unfolded(slot),
+            step => {
+                self.stack.push(Pending::wanted((slot, node)));
+                self.wait_or_give_up(node, step);
+                self.unfold_needed()?;
+            }
+        }
+        Ok(())
+    }
+
+    /// Unfolds what waits on the stack, from the top.
+    #[cold]
+    fn unfold_needed(&mut self) -> Result<(), TreeError> {
         while let Some(&Pending { slot, node, needed, .. }) = self.stack.last() {
             let slot = if slot == Slot::NONE { self.front.find(self.tree, node) } else { slot };
             if self.front.node(slot) == node && self.front.record(slot).is_active() {
@@ -620,51 +637,58 @@ impl<T: VertexTree, M: MeshSink> Steps<'_, T, M> {
                 continue;
             }
             match self.tree.unfold(node, self.mesh)? {
-                Step::Done => {}
-                Step::Needs(other) if !self.is_active(other) && !self.waits(other) => {
-                    if let Some(pending) = self.stack.last_mut() {
-                        pending.waits = true;
+                Step::Done => {
+                    self.stack.pop();
+                    if needed && !self.wanted(slot) {
+                        self.counts.forced += 1;
                     }
-                    self.stack.push(Pending::needed(other));
-                    continue;
+                    self.unfolded(slot);
                 }
-                Step::Blocked => {
-                    self.blocked.push(node);
-                    self.give_up();
-                    continue;
-                }
-                Step::Needs(_) | Step::NotResident | Step::StillNeeded => {
-                    self.missing.push(node);
-                    self.give_up();
-                    continue;
-                }
-            }
-            self.stack.pop();
-            self.counts.unfolds += 1;
-            if needed && !self.wanted(slot) {
-                self.counts.forced += 1;
-            }
-            self.finder.unwatch(slot);
-            for parent in self.front.parents(self.tree, slot) {
-                if self.front.record(parent).is_collapsible() {
-                    self.finder.unwatch(parent);
-                }
-            }
-            self.front.set_active(self.tree, slot);
-            self.watch(slot, Kind::Fold);
-            for child in self.front.children(self.tree, slot) {
-                let record = self.front.record(child);
-                if T::IS_TREE || record.is_boundary() {
-                    self.tests += 1;
-                    if self.frame.unfold(&record.bounds) {
-                        self.unfolding.push((child, record.node));
-                    } else {
-                        self.finder.watch(self.frame, child, Kind::Unfold, record.bounds);
-                    }
-                }
+                step => self.wait_or_give_up(node, step),
             }
         }
         Ok(())
+    }
+
+    /// The node on top of the stack has not been unfolded: what it needs goes on top of it, or it is left for later.
+    fn wait_or_give_up(&mut self, node: NodeId, step: Step) {
+        match step {
+            Step::Needs(other) if !self.is_active(other) && !self.waits(other) => {
+                if let Some(pending) = self.stack.last_mut() {
+                    pending.waits = true;
+                }
+                self.stack.push(Pending::needed(other));
+                return;
+            }
+            Step::Blocked => self.blocked.push(node),
+            Step::Done | Step::Needs(_) | Step::NotResident | Step::StillNeeded => self.missing.push(node),
+        }
+        self.give_up();
+    }
+
+    /// The backend has unfolded a node.
+    #[inline(always)]
+    fn unfolded(&mut self, slot: Slot) {
+        self.counts.unfolds += 1;
+        self.finder.unwatch(slot);
+        for parent in self.front.parents(self.tree, slot) {
+            if self.front.record(parent).is_collapsible() {
+                self.finder.unwatch(parent);
+            }
+        }
+        self.front.set_active(self.tree, slot);
+        self.watch(slot, Kind::Fold);
+        for child in self.front.children(self.tree, slot) {
+            let record = self.front.record(child);
+            if T::IS_TREE || record.is_boundary() {
+                self.tests += 1;
+                if self.frame.unfold(&record.bounds) {
+                    self.unfolding.push((child, record.node));
+                } else {
+                    self.finder.watch(self.frame, child, Kind::Unfold, record.bounds);
+                }
+            }
+        }
     }
 
     fn is_active(&self, node: NodeId) -> bool {
