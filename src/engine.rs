@@ -229,6 +229,12 @@ impl<T: VertexTree, M: MeshSink> Engine<T, M> {
         &self.tree
     }
 
+    /// The backend, to wait for its pages or to change what it may use. Folding or unfolding behind the engine's back
+    /// breaks the front.
+    pub fn tree_mut(&mut self) -> &mut T {
+        &mut self.tree
+    }
+
     /// The displayed mesh.
     pub fn mesh(&self) -> &M {
         &self.mesh

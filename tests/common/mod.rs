@@ -3,6 +3,8 @@
 
 pub mod backends;
 pub mod data;
+pub mod graph_cut;
+pub mod settled;
 pub mod sink;
 
 use foldfront::view::View;
