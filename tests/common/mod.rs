@@ -3,6 +3,7 @@
 
 pub mod backends;
 pub mod data;
+pub mod detail_block;
 pub mod sink;
 
 use foldfront::view::View;
