@@ -2,23 +2,21 @@
 //!
 //! 1 and 2, the merge tree and the coarsest mesh: [`replay`](crate::replay), with bounds from
 //! [`nesting`](crate::nesting). 4, the numbers of nodes and half-edges: [`layout`](crate::layout). 3 and 5 to 7, writing
-//! initial mesh, root list, block index and blocks: here. The sizes of blocks are known before any is written, so the
+//! initial mesh, root list, block index and blocks: [`writing`](crate::writing). The sizes of blocks are known before any is written, so the
 //! index can stand before them and the file is written from front to back.
 //!
 //! Besides the log and what is written, memory for some 60 bytes a triangle and 100 a vertex is taken.
 
-use std::io::{self, BufWriter, Write};
 use std::path::Path;
 
-use vertex_tree::{Collapse, CollapseLog, Mesh, NONE, output};
+use vertex_tree::{Collapse, CollapseLog, Mesh, NONE};
 
 use crate::error::XfmError;
-use crate::format::{Header, OFFSET_BITS, block_sum};
-use crate::half_edges::{BOUNDARY, HalfEdge};
+use crate::format::{Header, OFFSET_BITS};
+use crate::half_edges::BOUNDARY;
 use crate::layout::Layout;
 use crate::nesting::Nesting;
-use crate::node::Stored;
-use crate::numbering::{Levels, MOST_FACES, MOST_LEVELS, face_half_edge, node_half_edge};
+use crate::numbering::{Levels, MOST_FACES, MOST_LEVELS};
 use crate::quantize::Scale;
 use crate::replay::Replay;
 use crate::split_apart::Manifold;
@@ -82,18 +80,19 @@ pub fn write(path: &Path, log: &CollapseLog, options: &BuildOptions) -> Result<W
 
 /// A log arranged for an XFM file.
 pub struct Arrangement {
-    header: Header,
-    replay: Replay,
-    nesting: Nesting,
-    layout: Layout,
-    /// Positions of the input, and what became of its triangles.
-    mesh: Mesh,
-    /// Number in the file of each triangle's first half-edge; for each face, its triangle.
-    faces: Vec<u32>,
-    face_of: Vec<u32>,
-    initial: Vec<u32>,
+    pub(crate) header: Header,
+    pub(crate) replay: Replay,
+    pub(crate) nesting: Nesting,
+    pub(crate) layout: Layout,
+    /// The fully refined mesh in the vertices of the manifold one.
+    pub(crate) mesh: Mesh,
+    /// For each initial face, its input triangle; and the reverse.
+    pub(crate) faces: Vec<u32>,
+    pub(crate) face_of: Vec<u32>,
+    /// The vertices that initial faces use, ascending.
+    pub(crate) initial: Vec<u32>,
     /// Bytes of the blocks.
-    lengths: Vec<u16>,
+    pub(crate) lengths: Vec<u16>,
 }
 
 impl Arrangement {
@@ -255,125 +254,4 @@ impl Arrangement {
         };
         order.iter().map(needs).collect()
     }
-
-    /// Writes the file: to a temporary name, synced, then renamed.
-    ///
-    /// # Errors
-    /// [`XfmError::Write`]; nothing is left behind then.
-    pub fn write(&self, path: &Path) -> Result<WriteReport, XfmError> {
-        output::write_with(path, |file| {
-            let mut out = BufWriter::with_capacity(1 << 20, file);
-            self.write_to(&mut out)?;
-            out.flush()
-        })
-        .map_err(|source| XfmError::Write { file: path.display().to_string(), source })?;
-        Ok(self.report())
-    }
-
-    /// Writes what the file holds, from front to back.
-    ///
-    /// # Errors
-    /// What `out` says.
-    pub fn write_to(&self, out: &mut impl Write) -> io::Result<()> {
-        out.write_all(&self.header.encode())?;
-        let (positions, normals) = (&self.nesting.positions, &self.nesting.normals);
-        write_section(out, self.initial.iter(), |&v, bytes| {
-            for x in positions[v as usize].iter().chain(&normals[v as usize]) {
-                bytes.extend_from_slice(&x.to_le_bytes());
-            }
-        })?;
-        write_section(out, self.faces.iter(), |&t, bytes| {
-            let triangle = self.replay.manifold.edges.triangles[t as usize];
-            let vertex = |v| self.initial.partition_point(|&initial| initial < v) as u32;
-            for word in triangle.start.map(vertex).into_iter().chain(triangle.rev.map(|h| self.number(h))) {
-                bytes.extend_from_slice(&word.to_le_bytes());
-            }
-        })?;
-        write_section(out, self.replay.roots(), |n, bytes| {
-            bytes.extend_from_slice(&self.layout.node_of[n as usize].to_le_bytes());
-            let bounds = self.nesting.bounds[n as usize];
-            for x in bounds.center.into_iter().chain([bounds.radius, bounds.eps]) {
-                bytes.extend_from_slice(&x.to_le_bytes());
-            }
-        })?;
-        let mut at = self.header.sections()[4];
-        write_section(out, self.lengths.iter(), |&length, bytes| {
-            bytes.extend_from_slice(&(at | u64::from(length) << OFFSET_BITS).to_le_bytes());
-            at += u64::from(length);
-        })?;
-        let (mut places, mut bytes) = (Vec::new(), Vec::new());
-        for block in 0..self.layout.blocks.len() as u32 {
-            bytes.clear();
-            self.encode_block(block, &mut places, &mut bytes);
-            out.write_all(&bytes)?;
-        }
-        Ok(())
-    }
-
-    /// The file's number of a half-edge of an input triangle.
-    fn number(&self, h: HalfEdge) -> u32 {
-        if h == BOUNDARY {
-            return BOUNDARY;
-        }
-        let (t, k) = ((h >> 2) as usize, h & 3);
-        match self.replay.owner[t] {
-            NONE => face_half_edge(self.face_of[t], k),
-            n => {
-                let place = u32::from(self.replay.place[t]);
-                // A or D is number 0.
-                node_half_edge(self.layout.node_of[n as usize], place >> 2, (k + 3 - (place & 3)) % 3)
-            }
-        }
-    }
-
-    fn encode_block(&self, block: u32, places: &mut Vec<u32>, bytes: &mut Vec<u8>) {
-        let planned = self.layout.blocks[block as usize];
-        let set = self.header.levels.flag_bytes();
-        bytes.extend_from_slice(&planned.flags.to_le_bytes()[..set]);
-        bytes.extend_from_slice(&planned.parent.to_le_bytes());
-        if planned.children != 0 {
-            bytes.extend_from_slice(&planned.first_child.to_le_bytes());
-            bytes.extend_from_slice(&planned.children.to_le_bytes()[..set]);
-        }
-        self.layout.places(&self.replay, planned.root, places);
-        for &n in places.iter().filter(|&&n| n != NONE) {
-            let n = n as usize;
-            let merge = &self.replay.merges[n];
-            let bounds = self.nesting.bounds[n];
-            let adjacent = merge.adjacent;
-            Stored {
-                position: bounds.center,
-                normal: self.nesting.normals[merge.removed as usize],
-                radius: bounds.radius,
-                sine: self.nesting.sines[n],
-                adjacent: [adjacent.w, adjacent.x, adjacent.y, adjacent.z].map(|h| self.number(h)),
-                eps: bounds.eps,
-            }
-            .encode(self.header.quantisation(), bytes);
-        }
-        let sum = block_sum(block, bytes);
-        bytes.extend_from_slice(&sum.to_le_bytes());
-    }
-}
-
-/// Writes records and their checksum.
-fn write_section<T>(
-    out: &mut impl Write,
-    records: impl Iterator<Item = T>,
-    mut encode: impl FnMut(T, &mut Vec<u8>),
-) -> io::Result<()> {
-    const CHUNK: usize = 1 << 16;
-    let mut sum = crc32fast::Hasher::new();
-    let mut bytes = Vec::with_capacity(CHUNK + 64);
-    for record in records {
-        encode(record, &mut bytes);
-        if bytes.len() >= CHUNK {
-            sum.update(&bytes);
-            out.write_all(&bytes)?;
-            bytes.clear();
-        }
-    }
-    sum.update(&bytes);
-    out.write_all(&bytes)?;
-    out.write_all(&sum.finalize().to_le_bytes())
 }

@@ -88,9 +88,9 @@ impl Loader {
     pub fn ask(&self, run: Run, is_urgent: bool) {
         let mut queue = self.shared.queue.lock();
         if is_urgent {
-            queue.urgent.push_back(run)
+            queue.urgent.push_back(run);
         } else {
-            queue.ahead.push_back(run)
+            queue.ahead.push_back(run);
         }
         self.shared.work.notify_one();
     }

@@ -15,6 +15,7 @@
 use std::collections::VecDeque;
 use std::ops::Range;
 use std::sync::Arc;
+use std::time::{Duration, Instant};
 
 use rustc_hash::FxHashMap;
 use slab::Slab;
@@ -53,6 +54,8 @@ pub struct PagingCounts {
     pub refused: u64,
     /// The most bytes of blocks there ever were, with those under way.
     pub peak_bytes: u64,
+    /// How long frames have waited for blocks: where loading blocks only.
+    pub blocked: Duration,
 }
 
 struct Pending {
@@ -62,17 +65,17 @@ struct Pending {
 
 pub(crate) struct Paging {
     pub file: Arc<XfmFile>,
-    directory: Vec<u32>,
-    loaded: Slab<Block>,
+    pub directory: Vec<u32>,
+    pub loaded: Slab<Block>,
     pub bytes: u64,
     /// Bytes of blocks under way.
     pub reserved: u64,
-    candidates: VecDeque<(u64, u32)>,
-    stubs: FxHashMap<u32, Stub>,
+    pub candidates: VecDeque<(u64, u32)>,
+    pub stubs: FxHashMap<u32, Stub>,
     pending: FxHashMap<u32, Pending>,
     failures: FxHashMap<u32, u32>,
-    removed_at: FxHashMap<u32, u64>,
-    removed: VecDeque<(u64, u32)>,
+    pub removed_at: FxHashMap<u32, u64>,
+    pub removed: VecDeque<(u64, u32)>,
     loader: Option<Loader>,
     pub soft: u64,
     pub hard: u64,
@@ -245,11 +248,13 @@ impl Paging {
             loader.ask(run, node.is_some());
             return false;
         }
+        let start = Instant::now();
         let mut buffer = std::mem::take(&mut self.buffer);
         let answer = read_run(&self.file, run, &mut buffer);
         self.buffer = buffer;
         // Nobody waits: what asked goes on at once, or is refused and asks again.
         self.integrate(answer, &mut Vec::new());
+        self.counts.blocked += start.elapsed();
         (run.first..run.first + run.count).all(|number| self.block(number).is_some())
     }
 
@@ -331,77 +336,6 @@ impl Paging {
         self.may_go(number);
     }
 
-    /// A block may have become a candidate for removal.
-    pub fn may_go(&mut self, number: u32) {
-        if self.is_candidate(number) {
-            let frame = self.frame;
-            if let Some(block) = self.block_mut(number) {
-                block.stamp = frame;
-            }
-            self.candidates.push_back((frame, number));
-        }
-    }
-
-    /// The block of the sibling of a block's root, if there is one and the block above is loaded.
-    pub fn sibling(&self, number: u32) -> Option<u32> {
-        let parent = self.block(number)?.parent;
-        if parent == NONE {
-            return None;
-        }
-        self.child_blocks(NodeId(parent))?.find(|&other| other != number)
-    }
-
-    fn is_candidate(&self, number: u32) -> bool {
-        let is_folded = |number| self.block(number).is_none_or(|block| block.active == 0);
-        self.block(number).is_some() && is_folded(number) && self.sibling(number).is_none_or(is_folded)
-    }
-
-    /// The candidate that was used least recently, taken out of the queue. Not one that this frame has used.
-    fn next_candidate(&mut self) -> Option<u32> {
-        for _ in 0..self.candidates.len() {
-            let (stamp, number) = self.candidates.pop_front()?;
-            if self.block(number).is_none_or(|block| block.stamp != stamp) || !self.is_candidate(number) {
-                continue;
-            }
-            if self.block(number).is_some_and(|block| block.used < self.frame) {
-                return Some(number);
-            }
-            self.may_go(number);
-        }
-        None
-    }
-
-    fn remove(&mut self, number: u32) {
-        let slot = std::mem::replace(&mut self.directory[number as usize], NONE);
-        let block = self.loaded.remove(slot as usize);
-        self.bytes -= resident_bytes(block.nodes.len() as u32);
-        if block.parent != NONE && self.is_active(NodeId(block.parent)) {
-            let stub = Stub { bounds: block.nodes[0].stored.bounds(), parent: block.parent };
-            self.stubs.insert(number, stub);
-        }
-        self.counts.removals += 1;
-        self.removed_at.insert(number, self.frame);
-        self.removed.push_back((self.frame, number));
-    }
-
-    /// A node has been folded: its children are not in play any more.
-    pub fn drop_stubs(&mut self, node: NodeId) {
-        for number in self.child_blocks(node).unwrap_or_default() {
-            self.stubs.remove(&number);
-        }
-    }
-
-    /// Makes room for so many bytes below the hard quota.
-    fn make_room(&mut self, bytes: u64) -> bool {
-        while (self.bytes + self.reserved).saturating_add(bytes) > self.hard {
-            match self.next_candidate() {
-                Some(number) => self.remove(number),
-                None => return false,
-            }
-        }
-        true
-    }
-
     pub fn begin_frame(&mut self, arrived: &mut Vec<NodeId>) -> Result<(), TreeError> {
         self.frame += 1;
         if let Some(loader) = &self.loader {
@@ -424,26 +358,6 @@ impl Paging {
         if let Some(loader) = &self.loader {
             loader.settle();
         }
-    }
-
-    /// Removes candidates beyond the quotas.
-    pub fn end_frame(&mut self) -> PageStats {
-        while self.bytes > self.soft || self.bytes + self.reserved > self.hard {
-            match self.next_candidate() {
-                Some(number) => self.remove(number),
-                None => break,
-            }
-        }
-        while let Some(&(at, number)) = self.removed.front()
-            && at + SOON < self.frame
-        {
-            self.removed.pop_front();
-            if self.removed_at.get(&number) == Some(&at) {
-                self.removed_at.remove(&number);
-            }
-        }
-        let resident_bytes = self.bytes + self.file.fixed_bytes() + 4 * self.directory.len() as u64;
-        PageStats { resident_bytes, ..std::mem::take(&mut self.stats) }
     }
 }
 

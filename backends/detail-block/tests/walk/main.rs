@@ -1,7 +1,9 @@
 //! Random steps over files of random collapses of all kinds of meshes.
 
+mod damage;
 mod driver;
 mod meshes;
+mod paging;
 
 use detail_block::{Arrangement, BuildOptions, Loading, Settings};
 use driver::{Driver, bytes_of, open};
@@ -33,6 +35,20 @@ fn unfold_all(driver: &mut Driver, random: &mut Random) {
             return;
         }
         assert!(driver.unfold(boundary[random.below(boundary.len())]).unwrap());
+    }
+}
+
+/// Folds everything.
+fn fold_all(driver: &mut Driver) {
+    while !driver.active.is_empty() {
+        let nodes: Vec<NodeId> = driver.active.iter().rev().copied().collect();
+        let before = nodes.len();
+        for node in nodes {
+            if driver.is_collapsible(node) {
+                driver.fold(node).unwrap();
+            }
+        }
+        assert!(driver.active.len() < before, "nothing folds any more");
     }
 }
 
@@ -79,16 +95,7 @@ fn every_step_leaves_a_manifold_mesh() {
             if !options.quantize {
                 assert_is_input(&driver, &log);
             }
-            while !driver.active.is_empty() {
-                let nodes: Vec<NodeId> = driver.active.iter().rev().copied().collect();
-                let before = nodes.len();
-                for node in nodes {
-                    if driver.is_collapsible(node) {
-                        driver.fold(node).unwrap();
-                    }
-                }
-                assert!(driver.active.len() < before, "nothing folds any more");
-            }
+            fold_all(&mut driver);
             driver.tree.assert_well_formed();
             driver.assert_shows(&effective);
             forced += driver.forced;
