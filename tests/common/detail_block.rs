@@ -21,16 +21,12 @@ use super::backends::Follower;
 
 /// Options with these values, and the rest as usual.
 pub fn options(quantize: bool, nest_needs: bool) -> BuildOptions {
-    let mut options = BuildOptions::default();
-    (options.quantize, options.nest_needs) = (quantize, nest_needs);
-    options
+    BuildOptions { quantize, nest_needs, ..BuildOptions::default() }
 }
 
 /// Settings of a tree that loads in this way, without quotas.
 pub fn loading(loading: Loading) -> detail_block::Settings {
-    let mut settings = detail_block::Settings::default();
-    settings.loading = loading;
-    settings
+    detail_block::Settings { loading, ..detail_block::Settings::default() }
 }
 
 /// The file that an arrangement makes.

@@ -23,7 +23,6 @@ use crate::split_apart::Manifold;
 
 /// How to build a file.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-#[non_exhaustive]
 pub struct BuildOptions {
     /// Levels of a detail block, 1 to 5. The paper found 4 efficient.
     pub levels: u32,
@@ -51,7 +50,7 @@ pub struct WriteReport {
     pub added_vertices: u64,
     /// Non-manifold edges that were cut.
     pub cut_edges: u64,
-    /// Collapses of the log that are none of the manifold mesh.
+    /// Vertices that the log removes and that stay, as that would not have been a collapse of the manifold mesh.
     pub left_out: u64,
     /// Nodes.
     pub nodes: u64,
@@ -110,7 +109,8 @@ impl Arrangement {
         let manifold = Manifold::new(&log.mesh);
         let positions: Vec<_> =
             manifold.origin.iter().map(|&v| stored(log.mesh.positions[v as usize])).collect();
-        let (added_vertices, cut_edges) = (manifold.copies.len() as u64, manifold.cut_edges);
+        let added_vertices = (manifold.origin.len() - log.mesh.positions.len()) as u64;
+        let cut_edges = manifold.cut_edges;
         let degenerate = manifold.degenerate;
         // What the fully refined mesh is in the manifold's vertices.
         let mut mesh = Mesh { positions: positions.clone(), triangles: log.mesh.triangles.clone() };

@@ -296,7 +296,7 @@ impl XfmFile {
             ("degenerate triangles left out", h.degenerate.to_string()),
             ("non-manifold edges cut", h.cut_edges.to_string()),
             ("vertices added by splitting apart", h.added_vertices.to_string()),
-            ("collapses left out", h.left_out.to_string()),
+            ("vertices kept against the log", h.left_out.to_string()),
             ("nodes", h.nodes.to_string()),
             ("roots", h.roots.to_string()),
             ("initial vertices", h.initial_vertices.to_string()),

@@ -16,7 +16,7 @@
 //!     72      8  vertices of the input
 //!     80      8  of it, vertices that were added to split non-manifold ones apart
 //!     88      8  of it, non-manifold edges that were cut
-//!     96      8  collapses of the log that were left out
+//!     96      8  vertices that the log removes and that stay
 //!    104      8  input triangles that name a vertex twice, left out
 //!    112     12  lowest corner of the lattice of quantised positions, 3 f32
 //!    124      4  step of the lattice, f32

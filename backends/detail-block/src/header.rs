@@ -78,7 +78,7 @@ pub(crate) fn read_header(source: &dyn PageSource) -> Result<Header, XfmError> {
         (32, MOST_FACES - 1),
         (40, count(48)),
         (48, most_blocks),
-        (56, count(48) * u64::from(levels.full())),
+        (56, count(48).saturating_mul(levels.full().into())),
         (64, vertices),
         (72, vertices),
     ] {

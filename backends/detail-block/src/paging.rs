@@ -4,7 +4,8 @@
 //! when none of its nodes is active and the sibling of its root is folded too; then it is stamped with the frame and put
 //! at the end of a queue. Whether it still is a candidate is looked at when it comes to the front of the queue.
 //!
-//! * Beyond the **soft quota**, candidates are removed at the end of each frame, the least recently used first.
+//! * Beyond the **soft quota**, candidates are removed at the end of each frame, the least recently used first, once they
+//!   have been candidates for some frames.
 //! * The **hard quota** is never exceeded: a block is only asked for if it fits, with all that are under way; candidates
 //!   that this frame has not used make room, and if that is not enough, the block is missed. (Setting a quota below what
 //!   the front itself occupies is the exception: nothing is loaded then until the front has folded to below it.)
@@ -25,6 +26,7 @@ use crate::block::{Block, Node, resident_bytes};
 use crate::error::XfmError;
 use crate::file::XfmFile;
 use crate::loader::{Answer, Loader, Run, read_run};
+use crate::settings::Settings;
 
 /// How many times in a row reading a block may fail before that is an error of the tree.
 pub const ATTEMPTS: u32 = 16;
@@ -79,6 +81,7 @@ pub(crate) struct Paging {
     loader: Option<Loader>,
     pub soft: u64,
     pub hard: u64,
+    pub grace: u64,
     pub frame: u64,
     pub stats: PageStats,
     pub counts: PagingCounts,
@@ -88,7 +91,7 @@ pub(crate) struct Paging {
 }
 
 impl Paging {
-    pub fn new(file: Arc<XfmFile>, loader: Option<Loader>, [soft, hard]: [u64; 2]) -> Self {
+    pub fn new(file: Arc<XfmFile>, loader: Option<Loader>, settings: &Settings) -> Self {
         Self {
             directory: vec![NONE; file.header().blocks as usize],
             file,
@@ -102,8 +105,9 @@ impl Paging {
             removed_at: FxHashMap::default(),
             removed: VecDeque::new(),
             loader,
-            soft,
-            hard,
+            soft: settings.soft_quota,
+            hard: settings.hard_quota,
+            grace: settings.grace.into(),
             frame: 0,
             stats: PageStats::default(),
             counts: PagingCounts::default(),

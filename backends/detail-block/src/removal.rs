@@ -31,14 +31,19 @@ impl Paging {
         self.block(number).is_some() && is_folded(number) && self.sibling(number).is_none_or(is_folded)
     }
 
-    /// The candidate that was used least recently, taken out of the queue. Not one that this frame has used.
-    fn next_candidate(&mut self) -> Option<u32> {
-        for _ in 0..self.candidates.len() {
-            let (stamp, number) = self.candidates.pop_front()?;
-            if self.block(number).is_none_or(|block| block.stamp != stamp) || !self.is_candidate(number) {
+    /// The candidate that was used least recently, taken out of the queue, if nothing has used it since a frame.
+    fn next_candidate(&mut self, unused_since: u64) -> Option<u32> {
+        while let Some(&(stamp, number)) = self.candidates.front() {
+            let is_current = self.block(number).is_some_and(|block| block.stamp == stamp);
+            // Stamps ascend: those behind are no older.
+            if is_current && stamp >= unused_since {
+                return None;
+            }
+            self.candidates.pop_front();
+            if !is_current || !self.is_candidate(number) {
                 continue;
             }
-            if self.block(number).is_some_and(|block| block.used < self.frame) {
+            if self.block(number).is_some_and(|block| block.used < unused_since) {
                 return Some(number);
             }
             self.may_go(number);
@@ -69,7 +74,7 @@ impl Paging {
     /// Makes room for so many bytes below the hard quota.
     pub fn make_room(&mut self, bytes: u64) -> bool {
         while (self.bytes + self.reserved).saturating_add(bytes) > self.hard {
-            match self.next_candidate() {
+            match self.next_candidate(self.frame) {
                 Some(number) => self.remove(number),
                 None => return false,
             }
@@ -79,11 +84,15 @@ impl Paging {
 
     /// Removes candidates beyond the quotas.
     pub fn end_frame(&mut self) -> PageStats {
-        while self.bytes > self.soft || self.bytes + self.reserved > self.hard {
-            match self.next_candidate() {
-                Some(number) => self.remove(number),
-                None => break,
-            }
+        while self.bytes + self.reserved > self.hard
+            && let Some(number) = self.next_candidate(self.frame)
+        {
+            self.remove(number);
+        }
+        while self.bytes > self.soft
+            && let Some(number) = self.next_candidate(self.frame.saturating_sub(self.grace))
+        {
+            self.remove(number);
         }
         while let Some(&(at, number)) = self.removed.front()
             && at + SOON < self.frame

@@ -1,7 +1,7 @@
 //! The collapses of a log, made again on a manifold half-edge mesh: steps 1 and 2 of the paper's construction.
 //!
 //! The log's collapses were made on the input as it is. Split apart, an input vertex may be several, and a collapse of the
-//! log then is one of each of them that has an edge to a vertex that the kept one has become. It is made if it is a legal
+//! log then is one of each of them that has an edge to one that the kept vertex has become. It is made if it is a legal
 //! half-edge collapse of the manifold mesh:
 //!
 //! * one edge joins the two vertices, and their common neighbours are the far corners of the triangles at that edge alone
@@ -9,10 +9,11 @@
 //! * if both are on a boundary, so is the edge;
 //! * beside each triangle that vanishes one remains, and no triangle comes about twice.
 //!
-//! Any other is left out: its vertex stays for good, what was merged into it so far hangs below a root of its own, and
-//! later collapses are judged by the mesh as it then is. So every state from the input to the base mesh is manifold,
-//! and unfolded wholly the input is there, triangle for triangle. Virtual edges of `--merge-components` are no edges, so
-//! they are left out too.
+//! Any other is put off: its vertex stays where it is, but counts as one of those that the kept vertex has become, so that
+//! the log's later collapses of the kept vertex are tried for it too, and those into the kept vertex may go to it. Each is
+//! judged by the mesh as it then is. So every state from the input to the base mesh is manifold, and unfolded wholly
+//! the input is there, triangle for triangle. A vertex for which none is ever legal stays for good, and what was merged into
+//! it hangs below a root of its own. Virtual edges of `--merge-components` are no edges: they join nothing here.
 //!
 //! # What a split needs
 //!
@@ -30,6 +31,7 @@
 //! without doubled triangles and without degenerate ones. So every set of active nodes that is closed under tree and needs
 //! shows such a mesh.
 
+use rustc_hash::FxHashMap;
 use vertex_tree::{CollapseLog, NONE};
 
 use crate::half_edges::{Adjacent, BOUNDARY, HalfEdge, next, prev};
@@ -56,8 +58,12 @@ pub(crate) struct Replay {
     pub owner: Vec<u32>,
     /// Of a removed triangle, 4 for the one of D E F, plus which half-edge is A or D.
     pub place: Vec<u8>,
-    /// Collapses of the log that could not be made for a vertex that still had triangles.
+    /// Vertices that the log removes and that stay.
     pub left_out: u64,
+    /// For each vertex, the input vertex at which it is in the log by now.
+    stands_at: Vec<u32>,
+    /// For an input vertex, the vertices beside itself that are there in the log by now.
+    others: FxHashMap<u32, Vec<u32>>,
     /// For each vertex, the node at which it stands in the end, or [`NONE`].
     top: Vec<u32>,
     marks: Vec<(u32, u32)>,
@@ -77,12 +83,21 @@ impl Replay {
         mut add: impl FnMut(&mut Nesting, &Step<'_>) -> Result<(), E>,
     ) -> Result<Self, E> {
         let (vertices, triangles) = (manifold.origin.len(), log.mesh.triangles.len());
+        let manifold_origin = manifold.origin.clone();
+        let mut others: FxHashMap<u32, Vec<u32>> = FxHashMap::default();
+        for (copy, &origin) in (0..).zip(&manifold.origin) {
+            if copy != origin {
+                others.entry(origin).or_default().push(copy);
+            }
+        }
         let mut replay = Self {
             manifold,
             merges: Vec::with_capacity(log.collapses.len()),
             owner: vec![NONE; triangles],
             place: vec![0; triangles],
             left_out: 0,
+            stands_at: manifold_origin,
+            others,
             top: vec![NONE; vertices],
             marks: vec![(0, 0); vertices],
             stamp: 0,
@@ -94,13 +109,17 @@ impl Replay {
         let mut removed = Vec::new();
         for collapse in &log.collapses {
             removed.clear();
-            removed.extend(replay.manifold.copies_of(collapse.removed));
+            removed.push(collapse.removed);
+            removed.append(&mut replay.others.remove(&collapse.removed).unwrap_or_default());
             for &v in &removed {
                 if replay.manifold.out[v as usize] == BOUNDARY {
                     continue;
                 }
                 match replay.find_legal(v, collapse.kept) {
-                    None => replay.left_out += 1,
+                    None => {
+                        replay.stands_at[v as usize] = collapse.kept;
+                        replay.others.entry(collapse.kept).or_default().push(v);
+                    }
                     Some((u, [a, d])) => {
                         let adjacent = replay.manifold.edges.adjacent(a, d);
                         let _ = replay.manifold.edges.fan(adjacent, &mut replay.fan);
@@ -120,6 +139,9 @@ impl Replay {
                 }
             }
         }
+        let is_left =
+            |v: usize| replay.manifold.out[v] != BOUNDARY && replay.stands_at[v] != replay.manifold.origin[v];
+        replay.left_out = (0..vertices).filter(|&v| is_left(v)).count() as u64;
         Ok(replay)
     }
 
@@ -137,7 +159,7 @@ impl Replay {
     fn find_legal(&mut self, v: u32, kept: u32) -> Option<(u32, [HalfEdge; 2])> {
         let mut edges = std::mem::take(&mut self.edges_of_removed);
         self.manifold.edges_of(v, &mut self.orbit, &mut edges);
-        let candidates = edges.iter().filter(|&&(u, _)| self.manifold.origin[u as usize] == kept);
+        let candidates = edges.iter().filter(|&&(u, _)| self.stands_at[u as usize] == kept);
         let found = candidates.copied().collect::<Vec<_>>();
         let legal = found.into_iter().find(|&(u, edge)| self.is_legal(u, edge, &edges));
         self.edges_of_removed = edges;

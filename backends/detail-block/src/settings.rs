@@ -14,7 +14,6 @@ pub enum Loading {
 
 /// How a tree pages.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-#[non_exhaustive]
 pub struct Settings {
     /// How blocks are loaded.
     pub loading: Loading,
@@ -22,11 +21,15 @@ pub struct Settings {
     pub soft_quota: u64,
     /// Bytes of blocks that are never exceeded.
     pub hard_quota: u64,
+    /// Frames for which a block that has become a candidate for removal stays all the same, as far as the hard quota lets
+    /// it. Where what is displayed takes more than the soft quota, the least recently used block is one that has just
+    /// been used, and without this it is read again soon.
+    pub grace: u32,
 }
 
 impl Default for Settings {
     /// Loads in the background and never removes a block.
     fn default() -> Self {
-        Self { loading: Loading::Background, soft_quota: u64::MAX, hard_quota: u64::MAX }
+        Self { loading: Loading::Background, soft_quota: u64::MAX, hard_quota: u64::MAX, grace: 60 }
     }
 }

@@ -17,8 +17,6 @@ pub(crate) struct Manifold {
     pub origin: Vec<u32>,
     /// For each vertex, a half-edge that starts there, or [`BOUNDARY`].
     pub out: Vec<HalfEdge>,
-    /// The vertices beyond the input's, sorted by input vertex.
-    pub copies: Vec<(u32, u32)>,
     /// Edges that were cut.
     pub cut_edges: u64,
     /// Triangles that were left out.
@@ -42,19 +40,11 @@ impl Manifold {
             edges,
             origin: (0..mesh.positions.len() as u32).collect(),
             out: vec![BOUNDARY; mesh.positions.len()],
-            copies: Vec::new(),
             cut_edges,
             degenerate,
         };
         manifold.separate_fans();
         manifold
-    }
-
-    /// The vertices that an input vertex has become.
-    pub fn copies_of(&self, input: u32) -> impl Iterator<Item = u32> + '_ {
-        let first = self.copies.partition_point(|&(origin, _)| origin < input);
-        let more = self.copies[first..].iter().take_while(move |&&(origin, _)| origin == input);
-        std::iter::once(input).chain(more.map(|&(_, copy)| copy))
     }
 
     fn separate_fans(&mut self) {
@@ -75,7 +65,6 @@ impl Manifold {
                     let copy = self.origin.len() as u32;
                     self.origin.push(vertex);
                     self.out.push(first);
-                    self.copies.push((vertex, copy));
                     copy
                 };
                 for &h in &orbit {
@@ -84,7 +73,6 @@ impl Manifold {
                 }
             }
         }
-        self.copies.sort_unstable();
     }
 
     /// The edges from `v`: the vertex at the other end, and the half-edges to it and from it.

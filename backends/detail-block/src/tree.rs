@@ -55,7 +55,7 @@ impl XfmTree {
             })?),
         };
         let roots = file.roots().iter().map(|&(root, _)| root).collect();
-        let paging = Paging::new(file, loader, [settings.soft_quota, settings.hard_quota]);
+        let paging = Paging::new(file, loader, &settings);
         let loads_ahead = settings.loading == Loading::Background;
         Ok(Self { paging, roots, shown: None, displayed: 0, loads_ahead, ahead: Vec::new() })
     }

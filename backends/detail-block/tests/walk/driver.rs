@@ -37,11 +37,10 @@ impl MeshSink for StrictMesh {
     }
 }
 
-/// A triangle by the positions of its corners, the least first: what meshes are compared by.
-pub fn key(mut corners: [[u32; 3]; 3]) -> [[u32; 3]; 3] {
-    let least = (0..3).min_by_key(|&i| corners[i]).unwrap();
-    corners.rotate_left(least);
-    corners
+/// A triangle by the positions of its corners, in the least of its three rotations (two corners may be at one place): what
+/// meshes are compared by.
+pub fn key([a, b, c]: [[u32; 3]; 3]) -> [[u32; 3]; 3] {
+    [a, b, c].min([b, c, a]).min([c, a, b])
 }
 
 /// The triangles that a log shows for a set of active nodes, by brute force.

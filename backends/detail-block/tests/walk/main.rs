@@ -11,15 +11,11 @@ use meshes::{Random, grid, random_log, rubble, torus};
 use vertex_tree::{CollapseLog, Mesh, NodeId, VertexTree};
 
 fn options(levels: u32, quantize: bool, nest_needs: bool) -> BuildOptions {
-    let mut options = BuildOptions::default();
-    (options.levels, options.quantize, options.nest_needs) = (levels, quantize, nest_needs);
-    options
+    BuildOptions { levels, quantize, nest_needs }
 }
 
 fn blocking() -> Settings {
-    let mut settings = Settings::default();
-    settings.loading = Loading::Blocking;
-    settings
+    Settings { loading: Loading::Blocking, grace: 0, ..Settings::default() }
 }
 
 /// The mesh of each kind.
