@@ -5,7 +5,8 @@
 //! at the end of a queue. Whether it still is a candidate is looked at when it comes to the front of the queue.
 //!
 //! * Beyond the **soft quota**, candidates are removed at the end of each frame, the least recently used first, once they
-//!   have been candidates for some frames.
+//!   have been candidates for some frames, and only if the node above is folded: what hangs below an active node may be
+//!   unfolded next, and the paper's update loop (Figure 8) would load it again at once.
 //! * The **hard quota** is never exceeded: a block is only asked for if it fits, with all that are under way; candidates
 //!   that this frame has not used make room, and if that is not enough, the block is missed. (Setting a quota below what
 //!   the front itself occupies is the exception: nothing is loaded then until the front has folded to below it.)
@@ -72,7 +73,8 @@ pub(crate) struct Paging {
     pub bytes: u64,
     /// Bytes of blocks under way.
     pub reserved: u64,
-    pub candidates: VecDeque<(u64, u32)>,
+    /// Out of play, and in play; each with its stamp, ascending.
+    pub candidates: [VecDeque<(u64, u32)>; 2],
     pub stubs: FxHashMap<u32, Stub>,
     pending: FxHashMap<u32, Pending>,
     failures: FxHashMap<u32, u32>,
@@ -98,7 +100,7 @@ impl Paging {
             loaded: Slab::new(),
             bytes: 0,
             reserved: 0,
-            candidates: VecDeque::new(),
+            candidates: Default::default(),
             stubs: FxHashMap::default(),
             pending: FxHashMap::default(),
             failures: FxHashMap::default(),

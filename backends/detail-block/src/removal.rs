@@ -13,7 +13,8 @@ impl Paging {
             if let Some(block) = self.block_mut(number) {
                 block.stamp = frame;
             }
-            self.candidates.push_back((frame, number));
+            let which = usize::from(self.is_in_play(number));
+            self.candidates[which].push_back((frame, number));
         }
     }
 
@@ -31,24 +32,38 @@ impl Paging {
         self.block(number).is_some() && is_folded(number) && self.sibling(number).is_none_or(is_folded)
     }
 
-    /// The candidate that was used least recently, taken out of the queue, if nothing has used it since a frame.
-    fn next_candidate(&mut self, unused_since: u64) -> Option<u32> {
-        while let Some(&(stamp, number)) = self.candidates.front() {
+    /// Whether the root of a block hangs below an active node: it may be unfolded next.
+    fn is_in_play(&self, number: u32) -> bool {
+        let parent = self.block(number).map_or(NONE, |block| block.parent);
+        parent != NONE && self.is_active(NodeId(parent))
+    }
+
+    /// Of the candidates that are out of play, or of those in play, the one that was used least recently, taken out of its
+    /// queue, if nothing has used it since a frame.
+    fn next_candidate(&mut self, in_play: bool, unused_since: u64) -> Option<u32> {
+        let which = usize::from(in_play);
+        while let Some(&(stamp, number)) = self.candidates[which].front() {
             let is_current = self.block(number).is_some_and(|block| block.stamp == stamp);
             // Stamps ascend: those behind are no older.
             if is_current && stamp >= unused_since {
                 return None;
             }
-            self.candidates.pop_front();
+            self.candidates[which].pop_front();
             if !is_current || !self.is_candidate(number) {
                 continue;
             }
-            if self.block(number).is_some_and(|block| block.used < unused_since) {
+            let is_unused = self.block(number).is_some_and(|block| block.used < unused_since);
+            if is_unused && self.is_in_play(number) == in_play {
                 return Some(number);
             }
             self.may_go(number);
         }
         None
+    }
+
+    /// A candidate to make room below the hard quota: one in play if there is no other.
+    fn any_candidate(&mut self) -> Option<u32> {
+        self.next_candidate(false, self.frame).or_else(|| self.next_candidate(true, self.frame))
     }
 
     fn remove(&mut self, number: u32) {
@@ -65,16 +80,17 @@ impl Paging {
     }
 
     /// A node has been folded: its children are not in play any more.
-    pub fn drop_stubs(&mut self, node: NodeId) {
+    pub fn leave_play(&mut self, node: NodeId) {
         for number in self.child_blocks(node).unwrap_or_default() {
             self.stubs.remove(&number);
+            self.may_go(number);
         }
     }
 
     /// Makes room for so many bytes below the hard quota.
     pub fn make_room(&mut self, bytes: u64) -> bool {
         while (self.bytes + self.reserved).saturating_add(bytes) > self.hard {
-            match self.next_candidate(self.frame) {
+            match self.any_candidate() {
                 Some(number) => self.remove(number),
                 None => return false,
             }
@@ -85,12 +101,12 @@ impl Paging {
     /// Removes candidates beyond the quotas.
     pub fn end_frame(&mut self) -> PageStats {
         while self.bytes + self.reserved > self.hard
-            && let Some(number) = self.next_candidate(self.frame)
+            && let Some(number) = self.any_candidate()
         {
             self.remove(number);
         }
         while self.bytes > self.soft
-            && let Some(number) = self.next_candidate(self.frame.saturating_sub(self.grace))
+            && let Some(number) = self.next_candidate(false, self.frame.saturating_sub(self.grace))
         {
             self.remove(number);
         }

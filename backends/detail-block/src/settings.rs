@@ -23,7 +23,7 @@ pub struct Settings {
     pub hard_quota: u64,
     /// Frames for which a block that has become a candidate for removal stays all the same, as far as the hard quota lets
     /// it. Where what is displayed takes more than the soft quota, the least recently used block is one that has just
-    /// been used, and without this it is read again soon.
+    /// been used, and without this it is often read again soon.
     pub grace: u32,
 }
 

@@ -301,7 +301,7 @@ impl VertexTree for XfmTree {
                 }
             }
         }
-        self.paging.drop_stubs(node);
+        self.paging.leave_play(node);
         self.displayed -= brought(adjacent);
         Ok(Step::Done)
     }
