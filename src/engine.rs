@@ -7,11 +7,12 @@
 //!
 //! Everything here runs on the caller's thread. A backend may have threads of its own; no call waits for them.
 
+use std::collections::BinaryHeap;
 use std::time::{Duration, Instant};
 
 use vertex_tree::{MeshSink, NodeId, PageStats, Step, TreeError, VertexTree};
 
-use crate::budget::{Budget, Steering};
+use crate::budget::{Budget, FOLDING_SHARE, Steering, WorkCap};
 use crate::criterion::Criterion;
 use crate::front::{Front, Slot};
 use crate::motion::{Odometer, Speed};
@@ -32,6 +33,8 @@ pub struct Settings {
     pub omega: f64,
     /// What a frame may cost.
     pub budget: Budget,
+    /// What a frame may do.
+    pub work_cap: WorkCap,
 }
 
 impl Default for Settings {
@@ -43,6 +46,7 @@ impl Default for Settings {
             rho: 1.0,
             omega: 0.02,
             budget: Budget::None,
+            work_cap: WorkCap::None,
         }
     }
 }
@@ -58,6 +62,8 @@ pub enum Limit {
     Time,
     /// Pages that were not in memory.
     Io,
+    /// The cap on a frame's work.
+    Work,
 }
 
 impl Limit {
@@ -69,6 +75,7 @@ impl Limit {
             Self::Triangles => "triangles",
             Self::Time => "time",
             Self::Io => "io",
+            Self::Work => "work",
         }
     }
 }
@@ -88,6 +95,8 @@ pub struct FrameReport {
     pub folds: u64,
     /// Those of the unfolds that no view wanted: another node needed them.
     pub forced: u64,
+    /// Wanted changes left to later frames by the cap on work.
+    pub carried: u64,
     /// Wanted changes that a rule of the backend's own forbade, see [`Step::Blocked`].
     pub blocked: u64,
     /// Wanted changes that the backend refused for want of a page.
@@ -135,6 +144,16 @@ struct Counts {
     unfolds: u64,
     folds: u64,
     forced: u64,
+    carried: u64,
+}
+
+/// A change that waits for its turn where work is capped. The most urgent one is the greatest.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
+struct Urgent {
+    /// Bits of a number that is not negative, which are in the same order.
+    urgency: u64,
+    slot: Slot,
+    node: NodeId,
 }
 
 /// A front through a hierarchy of backend `T`, reporting the displayed mesh to `M`.
@@ -157,6 +176,7 @@ pub struct Engine<T, M> {
     still_needed: Vec<Noted>,
     folding: Vec<Noted>,
     unfolding: Vec<Noted>,
+    urgent: [BinaryHeap<Urgent>; 2],
     arrived: Vec<NodeId>,
     drawing_time: Duration,
 }
@@ -198,6 +218,7 @@ impl<T: VertexTree, M: MeshSink> Engine<T, M> {
             still_needed: Vec::new(),
             folding: Vec::new(),
             unfolding: Vec::new(),
+            urgent: Default::default(),
             arrived: Vec::new(),
             drawing_time: Duration::ZERO,
         })
@@ -244,6 +265,11 @@ impl<T: VertexTree, M: MeshSink> Engine<T, M> {
         self.steering.set_budget(budget);
     }
 
+    /// Sets another cap on a frame's work from the next frame on.
+    pub fn set_work_cap(&mut self, work_cap: WorkCap) {
+        self.settings.work_cap = work_cap;
+    }
+
     /// Adds what drawing took to the frame time that the next [`advance`](Self::advance) steers by.
     pub fn add_frame_time(&mut self, drawing: Duration) {
         self.drawing_time += drawing;
@@ -276,7 +302,7 @@ impl<T: VertexTree, M: MeshSink> Engine<T, M> {
             self.kappa = kappa;
         }
         let speed = Speed { rho: self.settings.rho, omega: self.settings.omega, kappa: self.kappa };
-        let mut motion = self.odometer.advance(&speed, &self.before, &self.views);
+        let mut motion = self.odometer.advance(&speed.into(), &self.before, &self.views);
         if redeclared {
             motion = crate::motion::Motion::Unbounded;
         }
@@ -307,7 +333,10 @@ impl<T: VertexTree, M: MeshSink> Engine<T, M> {
         step.blocked.clear();
         note(step.front, &self.flips.fold, step.folding);
         note(step.front, &self.flips.unfold, step.unfolding);
-        let applied = step.apply();
+        let applied = match self.settings.work_cap {
+            WorkCap::None => step.apply(),
+            cap => step.apply_within(cap, found, &mut self.urgent),
+        };
         if applied.is_err() {
             step.abandon();
         }
@@ -327,6 +356,7 @@ impl<T: VertexTree, M: MeshSink> Engine<T, M> {
         let triangles = self.tree.displayed_triangles();
         let limit = match self.steering.budget() {
             _ if misses > 0 => Limit::Io,
+            _ if counts.carried > 0 => Limit::Work,
             Budget::Triangles(_) if self.steering.limits() => Limit::Triangles,
             Budget::FrameTime(_) if self.steering.limits() => Limit::Time,
             _ => Limit::Error,
@@ -341,6 +371,7 @@ impl<T: VertexTree, M: MeshSink> Engine<T, M> {
             unfolds: counts.unfolds,
             folds: counts.folds,
             forced: counts.forced,
+            carried: counts.carried,
             blocked,
             misses,
             active_nodes: self.front.active_nodes() as u64,
@@ -383,15 +414,19 @@ struct Steps<'a, T, M> {
 impl<T: VertexTree, M: MeshSink> Steps<'_, T, M> {
     /// Folds, then unfolds, and whatever follows.
     fn apply(&mut self) -> Result<(), TreeError> {
-        self.take_turns(|steps| &mut *steps.folding, Self::fold)?;
-        self.take_turns(|steps| &mut *steps.unfolding, Self::unfold)?;
-        // What was needed when its turn came may have been let go since.
+        self.take_turns(Kind::Fold)?;
+        self.take_turns(Kind::Unfold)?;
+        self.let_go()
+    }
+
+    /// What was needed when its turn came may have been let go since.
+    fn let_go(&mut self) -> Result<(), TreeError> {
         let mut before = None;
         while !self.still_needed.is_empty() && before != Some(self.counts.folds) {
             before = Some(self.counts.folds);
             self.folding.clear();
             self.folding.append(self.still_needed);
-            self.take_turns(|steps| &mut *steps.folding, Self::fold)?;
+            self.take_turns(Kind::Fold)?;
             let front = &*self.front;
             self.still_needed.sort_unstable();
             self.still_needed.dedup();
@@ -401,6 +436,58 @@ impl<T: VertexTree, M: MeshSink> Steps<'_, T, M> {
             self.refused(slot, Kind::Fold);
         }
         Ok(())
+    }
+
+    /// The same within a cap, most urgent first. `start` is when the work began.
+    fn apply_within(
+        &mut self,
+        cap: WorkCap,
+        start: Instant,
+        [folds, unfolds]: &mut [BinaryHeap<Urgent>; 2],
+    ) -> Result<(), TreeError> {
+        let is_spent = |counts: &Counts, share: f64| match cap {
+            WorkCap::None => false,
+            WorkCap::Changes(most) => (counts.folds + counts.unfolds) as f64 >= most as f64 * share,
+            WorkCap::Time(most) => start.elapsed() >= most.mul_f64(share),
+        };
+        let mut result = Ok(());
+        // Folds that must not wait, unfolds, and folds again with what is left.
+        for (kind, share) in [(Kind::Fold, FOLDING_SHARE), (Kind::Unfold, 1.0), (Kind::Fold, 1.0)] {
+            let heap = if kind == Kind::Fold { &mut *folds } else { &mut *unfolds };
+            loop {
+                // At first all that was found, later what follows from a change.
+                self.await_turn(kind, heap);
+                if result.is_err() || is_spent(&self.counts, share) {
+                    break;
+                }
+                let Some(Urgent { slot, node, .. }) = heap.pop() else { break };
+                result = match kind {
+                    Kind::Fold => self.fold((slot, node)),
+                    Kind::Unfold => self.unfold((slot, node)),
+                };
+            }
+        }
+        for (kind, heap) in [(Kind::Fold, folds), (Kind::Unfold, unfolds)] {
+            for Urgent { slot, node, .. } in heap.drain() {
+                let is_still = if kind == Kind::Fold { is_collapsible } else { is_boundary };
+                if is_still(self.front, (slot, node)) {
+                    self.counts.carried += 1;
+                    self.refused(slot, kind);
+                }
+            }
+        }
+        result.and_then(|()| self.let_go())
+    }
+
+    /// Moves the changes found so far to a heap.
+    fn await_turn(&mut self, kind: Kind, heap: &mut BinaryHeap<Urgent>) {
+        let list = if kind == Kind::Fold { &mut *self.folding } else { &mut *self.unfolding };
+        heap.extend(list.drain(..).map(|(slot, node)| {
+            let urgency = self.frame.criterion.urgency(self.frame.views, &self.front.record(slot).bounds);
+            // Of what is to be folded, the least wanted first.
+            let urgency = if kind == Kind::Fold { 1.0 - urgency.min(1.0) } else { urgency };
+            Urgent { urgency: urgency.max(0.0).to_bits(), slot, node }
+        }));
     }
 
     /// The backend can not go on: whatever was to change is to be looked at again when it can.
@@ -421,41 +508,40 @@ impl<T: VertexTree, M: MeshSink> Steps<'_, T, M> {
     /// Changes the nodes of a list, which may grow meanwhile. While some change, those whose turn comes next are prepared,
     /// the further off the less.
     #[inline(always)]
-    fn take_turns(
-        &mut self,
-        list: impl Fn(&mut Self) -> &mut Vec<Noted>,
-        change: impl Fn(&mut Self, Noted) -> Result<(), TreeError>,
-    ) -> Result<(), TreeError> {
-        let mut noted = std::mem::take(list(self));
+    fn take_turns(&mut self, kind: Kind) -> Result<(), TreeError> {
         let mut prepared = [0; MOST_STEPS];
         let steps = T::PREPARATION.clamp(1, MOST_STEPS);
         let mut done = 0;
-        let mut result = Ok(());
-        while done < noted.len() && result.is_ok() {
+        while done < self.list(kind).len() {
             for (step, prepared) in prepared[..steps].iter_mut().enumerate() {
-                let end = noted.len().min(done + TOGETHER * (steps - step));
-                for &(slot, node) in &noted[*prepared..end] {
-                    match step {
-                        0 => {
-                            self.front.prefetch_linked(slot);
-                            self.finder.prefetch(slot);
-                            self.tree.prepare(node, 0, self.mesh);
-                        }
-                        _ => self.tree.prepare(node, step, self.mesh),
+                let end = self.list(kind).len().min(done + TOGETHER * (steps - step));
+                for &(slot, node) in &self.list(kind)[*prepared..end] {
+                    if step == 0 {
+                        self.front.prefetch_linked(slot);
+                        self.finder.prefetch(slot);
                     }
+                    self.tree.prepare(node, step, self.mesh);
                 }
                 *prepared = end;
             }
-            let end = noted.len().min(done + TOGETHER);
-            while done < end && result.is_ok() {
-                result = change(self, noted[done]);
-                done += 1;
+            let end = self.list(kind).len().min(done + TOGETHER);
+            for at in done..end {
+                match kind {
+                    Kind::Fold => self.fold(self.folding[at])?,
+                    Kind::Unfold => self.unfold(self.unfolding[at])?,
+                }
             }
-            // What follows from these changes.
-            noted.append(list(self));
+            done = end;
         }
-        *list(self) = noted;
-        result
+        Ok(())
+    }
+
+    #[inline(always)]
+    fn list(&self, kind: Kind) -> &Vec<Noted> {
+        match kind {
+            Kind::Fold => self.folding,
+            Kind::Unfold => self.unfolding,
+        }
     }
 
     fn wanted(&mut self, slot: Slot) -> bool {
