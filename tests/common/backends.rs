@@ -20,11 +20,13 @@ use mt_partition::{BuildOptions, MtTree};
 use super::graph_cut::{self, GraphCut};
 use super::settled::Settled;
 
+use super::detail_block as detail;
+
 /// Opens a hierarchy once for each of the settings.
 type Open = fn(&CollapseLog, &[Settings]) -> Vec<Box<dyn Follower>>;
 
 /// The backends and how to open them.
-const BACKENDS: [(&str, Open); 3] = [
+const BACKENDS: [(&str, Open); 5] = [
     ("in-memory", |log, settings| {
         let hierarchy = Arc::new(Hierarchy::new(log).unwrap());
         follow(settings, || InMemoryTree::new(hierarchy.clone()))
@@ -42,6 +44,9 @@ const BACKENDS: [(&str, Open); 3] = [
         let own = |settings| OwnGraph { engine: engine(settings), cut: cut.clone() };
         settings.iter().map(|settings| Box::new(own(settings)) as Box<dyn Follower>).collect()
     }),
+    // As in the paper, where frames wait for blocks; and quantised, by an I/O thread that is waited for.
+    ("detail-block", |log, settings| detail::follow(log, settings, false)),
+    ("detail-block quantised", |log, settings| detail::follow(log, settings, true)),
 ];
 
 fn follow<T: VertexTree + 'static>(settings: &[Settings], tree: impl Fn() -> T) -> Vec<Box<dyn Follower>> {
@@ -50,7 +55,7 @@ fn follow<T: VertexTree + 'static>(settings: &[Settings], tree: impl Fn() -> T) 
 }
 
 /// An engine, whatever its backend.
-trait Follower {
+pub trait Follower {
     fn advance(&mut self, views: &[View]) -> FrameReport;
     fn set_budget(&mut self, budget: Budget);
     fn strategy(&self) -> Strategy;
