@@ -1,0 +1,530 @@
+//! Main-memory buffer management: El-Sana & Chiang (2000), section 3.3.3, and the urgent requests of section 3.3.2.
+//!
+//! There are K place holders, each as large as the largest page. A table says for each page where it is, if it is
+//! anywhere: the paper's hash table, whose hash function is the identity here. A page has two counts, kept whether it is
+//! in memory or not: its *usage count*, the nodes and leaves of the front on it, and its *reference count*, how many of
+//! the pages above and below it are in use. A page whose counts are both 0 is flushed: its place holder joins the free
+//! list at the end, and keeps the page until the place is taken, first in, first out (its *second chance*). A count that
+//! rises above 0 asks for the page; where no place is free, that is given up for now, and tried again when one is.
+//!
+//! A page that is missing at a change is asked for *urgently*: a place is taken from the free list, or from a page that is
+//! only referred to. Switching down is allowed that only while three place holders are not in use, so that switching
+//! up always finds one; those on their way are reserved and do not count.
+//!
+//! # Beyond the paper
+//!
+//! The paper's navigation reads the nodes of the front in every frame, so that their pages must stay. Ours does not: the
+//! engine keeps sphere and error of the front itself, and a page is touched only by a change. So with
+//! [`InUse::Yields`], the default, a page in use that has not been touched for longest is given up where nothing else is
+//! left, for switching down too, and every cut can be reached with any number of place holders from four on. With
+//! [`InUse::Stays`] the three-free rule holds as printed, and a front that needs more pages than there are is coarser.
+//!
+//! What may be needed next is near what has just changed. So where places are short, the pages around one that is touched
+//! may also take the place of pages that have not been touched for [`IDLE`] frames.
+
+use std::collections::VecDeque;
+use std::sync::Arc;
+
+use rustc_hash::FxHashMap;
+use vertex_tree::{NONE, PageStats};
+
+use crate::board::{Board, Command, Done};
+use crate::error::MetaNodeError;
+use crate::file::MetaNodeFile;
+use crate::lists::{Class, Lists};
+use crate::page::{Layout, Page};
+
+/// The least number of place holders: one in use and three that are not.
+pub(crate) const LEAST_HOLDERS: u32 = 4;
+
+/// Frames without a touch after which a page may make room for one that is only likely to be needed.
+const IDLE: u64 = 8;
+
+/// The longest that a page that could not be read is left alone, in frames.
+const LONGEST_REST: u64 = 64;
+
+/// Pages that were given up for want of a place and are tried again later; beyond so many, the oldest are forgotten.
+const MOST_GIVEN_UP: usize = 4096;
+
+/// In the table: the page is on its way.
+const PENDING: u32 = 1 << 31;
+
+/// What happens to pages with nodes of the front where there is no other place.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum InUse {
+    /// The one that has not been touched for longest makes room. Every cut can be reached.
+    #[default]
+    Yields,
+    /// They stay, as in the paper, but for switching up and for less memory. A cut that needs more is not reached.
+    Stays,
+}
+
+/// Which way a change goes that finds its page missing.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) enum Switch {
+    Down,
+    Up,
+}
+
+/// A place for a page.
+#[derive(Debug, Default)]
+struct Holder {
+    /// Empty until it is used for the first time, and while it travels with a command.
+    words: Box<[u32]>,
+    /// [`NONE`] while it holds none and waits for none.
+    page: u32,
+    layout: Layout,
+    /// The last frame in which the page was touched, or came in answer to an urgent request.
+    touched: u64,
+    /// Whether the pages around are counting this one as in use.
+    counted: bool,
+}
+
+/// A page that could not be read.
+#[derive(Clone, Copy, Debug, Default)]
+struct Failure {
+    times: u32,
+    /// Not to be asked for before this frame.
+    until: u64,
+}
+
+pub(crate) struct Pager {
+    pub file: Arc<MetaNodeFile>,
+    board: Arc<Board>,
+    in_use: InUse,
+    frame: u64,
+    /// For each page: its place holder, with [`PENDING`] while it is on its way; [`NONE`] if it is nowhere.
+    table: Vec<u32>,
+    usage: Vec<u16>,
+    references: Vec<u16>,
+    holders: Vec<Holder>,
+    lists: Lists,
+    /// K, and how many place holders there are; more than K only while the last too many are on their way.
+    allowed: u32,
+    live: u32,
+    /// Place holders that are there only in name.
+    retired: Vec<u32>,
+    /// Pages below this number are never evicted.
+    kept: u32,
+    /// Place holders with a page, and those on their way.
+    resident: u32,
+    pending: u32,
+    given_up: VecDeque<u32>,
+    failures: FxHashMap<u32, Failure>,
+    outbox: Vec<Command>,
+    promoted: Vec<u32>,
+    done: Vec<Done>,
+    stats: PageStats,
+    last_fault: Option<MetaNodeError>,
+}
+
+impl Drop for Pager {
+    /// The thread ends after the read that it is at. Nobody waits for that.
+    fn drop(&mut self) {
+        self.board.stop();
+    }
+}
+
+impl Pager {
+    /// Starts the I/O thread.
+    pub fn new(file: Arc<MetaNodeFile>, page_memory: u64, in_use: InUse) -> Result<Self, MetaNodeError> {
+        let pages = file.header.pages as usize;
+        let board = Arc::new(Board::default());
+        let mut pager = Self {
+            board: board.clone(),
+            in_use,
+            frame: 1,
+            table: vec![NONE; pages],
+            usage: vec![0; pages],
+            references: vec![0; pages],
+            holders: Vec::new(),
+            lists: Lists::new(pages.max(LEAST_HOLDERS as usize)),
+            allowed: 0,
+            live: 0,
+            retired: Vec::new(),
+            kept: 0,
+            resident: 0,
+            pending: 0,
+            given_up: VecDeque::new(),
+            failures: FxHashMap::default(),
+            outbox: Vec::new(),
+            promoted: Vec::new(),
+            done: Vec::new(),
+            stats: PageStats::default(),
+            last_fault: None,
+            file,
+        };
+        pager.set_page_memory(page_memory)?;
+        let file = pager.file.clone();
+        let read = move |page, words: &mut [u32]| {
+            // A store is other people's code: a panic there is a fault like any other.
+            let read = std::panic::AssertUnwindSafe(|| file.read_page(page, words));
+            std::panic::catch_unwind(read).unwrap_or_else(|_| {
+                Err(MetaNodeError::Page {
+                    file: file.name().to_owned(),
+                    page,
+                    offset: file.page_offset(page),
+                    reason: "the store panicked",
+                })
+            })
+        };
+        std::thread::Builder::new()
+            .name("meta-node I/O".to_owned())
+            .spawn(move || board.serve(read))
+            .map_err(MetaNodeError::Thread)?;
+        Ok(pager)
+    }
+
+    /// Sets how much memory the place holders may take. Less than now takes effect at once.
+    pub fn set_page_memory(&mut self, bytes: u64) -> Result<(), MetaNodeError> {
+        let each = self.file.holder_bytes();
+        let most = self.file.header.pages.max(LEAST_HOLDERS);
+        let allowed = u32::try_from(bytes / each).unwrap_or(u32::MAX).min(most);
+        if allowed < LEAST_HOLDERS {
+            let least = each * u64::from(LEAST_HOLDERS);
+            return Err(MetaNodeError::Memory { given: bytes, least, holders: LEAST_HOLDERS });
+        }
+        self.allowed = allowed;
+        // Roots stay, unless a forest of thousands of trees would leave no room for anything else.
+        let roots = self.file.header.root_pages;
+        let kept = if roots <= allowed / 2 { roots } else { 0 };
+        let before = std::mem::replace(&mut self.kept, kept);
+        for page in 0..before.max(kept) {
+            self.classify(page);
+        }
+        while self.live < allowed {
+            let holder = self.retired.pop().unwrap_or_else(|| {
+                self.holders.push(Holder { page: NONE, ..Holder::default() });
+                self.holders.len() as u32 - 1
+            });
+            self.lists.push(holder, Class::Free);
+            self.live += 1;
+        }
+        self.shrink();
+        Ok(())
+    }
+
+    /// Gives place holders up until there are no more than allowed, except those that are being filled right now.
+    fn shrink(&mut self) {
+        while self.live > self.allowed {
+            let lists = &self.lists;
+            let victim =
+                [Class::Free, Class::Prefetched, Class::InUse].into_iter().find_map(|c| lists.front(c));
+            let holder = match victim {
+                Some(holder) => {
+                    self.evict(holder);
+                    holder
+                }
+                None => match self.withdraw() {
+                    Some(holder) => holder,
+                    None => return,
+                },
+            };
+            self.lists.remove(holder);
+            self.holders[holder as usize].words = Box::default();
+            self.retired.push(holder);
+            self.live -= 1;
+        }
+    }
+
+    /// Takes back a place holder that is to be filled with something not urgent.
+    fn withdraw(&mut self) -> Option<u32> {
+        let at = self.outbox.iter().rposition(|command| !command.urgent);
+        let command = at.map(|at| self.outbox.remove(at)).or_else(|| self.board.take_back())?;
+        self.table[command.page as usize] = NONE;
+        self.pending -= 1;
+        let holder = &mut self.holders[command.holder as usize];
+        holder.words = command.words;
+        holder.page = NONE;
+        self.promoted.retain(|&page| page != command.page);
+        Some(command.holder)
+    }
+
+    /// Where a page is, if it is in memory.
+    #[inline(always)]
+    pub fn find(&self, page: u32) -> Option<u32> {
+        Some(self.table[page as usize]).filter(|&holder| holder < PENDING)
+    }
+
+    #[inline(always)]
+    pub fn page(&self, holder: u32) -> Page<'_> {
+        let holder = &self.holders[holder as usize];
+        Page { words: &holder.words, layout: &holder.layout }
+    }
+
+    /// A change has been made on a page: what is around it may be needed soon.
+    #[inline(always)]
+    pub fn touch(&mut self, holder: u32) {
+        if self.holders[holder as usize].touched != self.frame {
+            self.touch_first(holder);
+        }
+    }
+
+    fn touch_first(&mut self, holder: u32) {
+        self.holders[holder as usize].touched = self.frame;
+        if self.resident == self.file.header.pages {
+            // Nothing is missing and nothing will be evicted: order does not matter.
+            return;
+        }
+        if let Some(class) = self.lists.class(holder) {
+            self.lists.push(holder, class);
+        }
+        let Layout { parent, first_child, children, .. } = self.holders[holder as usize].layout;
+        if parent != NONE {
+            self.prefetch(parent);
+        }
+        for page in first_child..first_child + children {
+            self.prefetch(page);
+        }
+    }
+
+    /// Nodes of the front have come to a page or left it.
+    #[inline(always)]
+    pub fn count_usage(&mut self, page: u32, by: i32) {
+        let before = self.usage[page as usize];
+        // A count never exceeds the children of the nodes on a page.
+        let now = (i32::from(before) + by) as u16;
+        self.usage[page as usize] = now;
+        if (before == 0) != (now == 0) {
+            self.switch_usage(page, now > 0);
+        }
+    }
+
+    fn switch_usage(&mut self, page: u32, in_use: bool) {
+        self.classify(page);
+        match self.find(page) {
+            Some(holder) => self.count_around(holder, in_use),
+            None if in_use => self.prefetch(page),
+            None => {}
+        }
+    }
+
+    /// Tells the pages around one that is in memory whether it is in use.
+    fn count_around(&mut self, holder: u32, in_use: bool) {
+        let Holder { counted, layout, touched, .. } = &mut self.holders[holder as usize];
+        if std::mem::replace(counted, in_use) == in_use {
+            return;
+        }
+        let Layout { parent, first_child, children, .. } = *layout;
+        if in_use {
+            // It must not make room for what it asks for.
+            *touched = (*touched).max(self.frame - 1);
+        }
+        let parent = Some(parent).filter(|&parent| parent != NONE);
+        for page in parent.into_iter().chain(first_child..first_child + children) {
+            let count = &mut self.references[page as usize];
+            *count = if in_use { *count + 1 } else { count.saturating_sub(1) };
+            if *count == u16::from(in_use) {
+                self.classify(page);
+                if in_use {
+                    self.prefetch(page);
+                }
+            }
+        }
+    }
+
+    /// Puts a page's place holder into the list where it belongs.
+    fn classify(&mut self, page: u32) {
+        let Some(holder) = self.find(page) else { return };
+        if page < self.kept {
+            self.lists.remove(holder);
+            return;
+        }
+        let (usage, references) = (self.usage[page as usize], self.references[page as usize]);
+        let class = match (usage, references) {
+            (0, 0) => Class::Free,
+            (0, _) => Class::Prefetched,
+            _ => Class::InUse,
+        };
+        if self.lists.class(holder) != Some(class) {
+            self.lists.push(holder, class);
+        }
+    }
+
+    /// Drops the page from a place holder.
+    fn evict(&mut self, holder: u32) {
+        let page = std::mem::replace(&mut self.holders[holder as usize].page, NONE);
+        if page != NONE {
+            self.count_around(holder, false);
+            self.table[page as usize] = NONE;
+            self.resident -= 1;
+        }
+    }
+
+    /// The first place holder of a list, if it may be taken: not if it has been touched in this frame, or has come in
+    /// answer to an urgent request at its start.
+    fn takeable(&self, class: Class, before: u64) -> Option<u32> {
+        self.lists.front(class).filter(|&holder| self.holders[holder as usize].touched < before)
+    }
+
+    /// Asks for a page that is likely to be needed, if there is a place for it.
+    fn prefetch(&mut self, page: u32) {
+        if self.table[page as usize] != NONE {
+            return;
+        }
+        if self.rests(page) {
+            return self.give_up(page);
+        }
+        let place = self.takeable(Class::Free, self.frame).or_else(|| {
+            let idle = self.frame.saturating_sub(IDLE);
+            [Class::Prefetched, Class::InUse].into_iter().find_map(|class| {
+                self.takeable(class, idle)
+                    .filter(|_| class == Class::Prefetched || self.in_use == InUse::Yields)
+            })
+        });
+        match place {
+            Some(holder) => self.ask(page, holder, false),
+            None => self.give_up(page),
+        }
+    }
+
+    fn give_up(&mut self, page: u32) {
+        if self.given_up.len() == MOST_GIVEN_UP {
+            self.given_up.pop_front();
+        }
+        self.given_up.push_back(page);
+    }
+
+    /// Asks for a page that is missing at a change.
+    pub fn urge(&mut self, page: u32, switch: Switch) {
+        match self.table[page as usize] {
+            NONE => {}
+            pending if pending & PENDING != 0 => {
+                match self.outbox.iter_mut().find(|command| command.page == page) {
+                    Some(command) => command.urgent = true,
+                    None => self.promoted.push(page),
+                }
+                return;
+            }
+            _ => return,
+        }
+        if !self.rests(page)
+            && let Some(holder) = self.place(switch)
+        {
+            self.ask(page, holder, true);
+        }
+    }
+
+    /// A place for an urgent request.
+    fn place(&mut self, switch: Switch) -> Option<u32> {
+        let stays = self.in_use == InUse::Stays;
+        let not_in_use = self.lists.len(Class::Free) + self.lists.len(Class::Prefetched);
+        if switch == Switch::Down && stays && not_in_use < 3 {
+            return None;
+        }
+        if let Some(free) = self.takeable(Class::Free, self.frame) {
+            return Some(free);
+        }
+        let prefetched = self.takeable(Class::Prefetched, self.frame);
+        let used = self.takeable(Class::InUse, self.frame).filter(|_| !stays || switch == Switch::Up);
+        let touched = |holder: u32| self.holders[holder as usize].touched;
+        match (prefetched, used) {
+            // What has long been of no use goes first, whatever its counts.
+            (Some(p), Some(u)) if !stays && touched(u) < touched(p) => Some(u),
+            (Some(p), _) => Some(p),
+            (None, used) => self.withdraw().or(used),
+        }
+    }
+
+    /// Whether a page has failed so recently that it is left alone for now.
+    fn rests(&self, page: u32) -> bool {
+        !self.failures.is_empty()
+            && self.failures.get(&page).is_some_and(|failure| failure.until > self.frame)
+    }
+
+    fn ask(&mut self, page: u32, holder: u32, urgent: bool) {
+        self.evict(holder);
+        self.lists.remove(holder);
+        let room = self.file.header.largest_words as usize;
+        let slot = &mut self.holders[holder as usize];
+        slot.page = page;
+        let mut words = std::mem::take(&mut slot.words);
+        if words.len() != room {
+            words = vec![0; room].into();
+        }
+        self.table[page as usize] = PENDING | holder;
+        self.pending += 1;
+        self.outbox.push(Command { page, holder, words, urgent });
+    }
+
+    /// Starts a frame: takes what has arrived. Says whether anything has.
+    pub fn begin_frame(&mut self) -> bool {
+        self.frame += 1;
+        let mut done = std::mem::take(&mut self.done);
+        self.board.collect(&mut done);
+        let any = !done.is_empty();
+        for Done { command, result } in done.drain(..) {
+            match result {
+                Ok(layout) => self.arrive(command, layout),
+                Err(fault) => self.fail(command, fault),
+            }
+        }
+        self.done = done;
+        self.shrink();
+        any
+    }
+
+    fn arrive(&mut self, command: Command, layout: Layout) {
+        let Command { page, holder, words, urgent } = command;
+        self.failures.remove(&page);
+        self.stats.reads += 1;
+        self.stats.read_bytes += 4 * self.file.page_words(page) as u64;
+        self.table[page as usize] = holder;
+        self.pending -= 1;
+        self.resident += 1;
+        let touched = self.frame - u64::from(!urgent);
+        self.holders[holder as usize] = Holder { words, page, layout, touched, counted: false };
+        self.classify(page);
+        if self.usage[page as usize] > 0 {
+            self.count_around(holder, true);
+        }
+    }
+
+    fn fail(&mut self, command: Command, fault: MetaNodeError) {
+        let Command { page, holder, words, .. } = command;
+        self.stats.faults += 1;
+        self.last_fault = Some(fault);
+        self.table[page as usize] = NONE;
+        self.pending -= 1;
+        let slot = &mut self.holders[holder as usize];
+        slot.words = words;
+        slot.page = NONE;
+        slot.touched = 0;
+        self.lists.push(holder, Class::Free);
+        // Asked for again, but not in every frame forever.
+        let failure = self.failures.entry(page).or_default();
+        failure.until = self.frame + (1 << failure.times.min(63)).min(LONGEST_REST) - 1;
+        failure.times += 1;
+        self.give_up(page);
+    }
+
+    /// Ends a frame: tries again what was given up, and posts all commands.
+    pub fn end_frame(&mut self) -> PageStats {
+        for _ in 0..self.given_up.len() {
+            if self.takeable(Class::Free, self.frame).is_none() {
+                break;
+            }
+            let Some(page) = self.given_up.pop_front() else { break };
+            if self.usage[page as usize] > 0 || self.references[page as usize] > 0 {
+                self.prefetch(page);
+            }
+        }
+        self.post();
+        self.stats.resident_bytes = u64::from(self.resident + self.pending) * self.file.holder_bytes();
+        std::mem::take(&mut self.stats)
+    }
+
+    fn post(&mut self) {
+        self.board.post(&mut self.outbox, &mut self.promoted);
+    }
+
+    /// Waits until everything that has been asked for is there, or has failed.
+    pub fn settle(&mut self) {
+        self.post();
+        self.board.settle();
+    }
+
+    pub fn last_fault(&self) -> Option<&MetaNodeError> {
+        self.last_fault.as_ref()
+    }
+}
