@@ -12,21 +12,29 @@
 //!   event comes up to an eighth of its time early, is tested for nothing, and is scheduled again.
 //! * There can be several clocks, each with a wheel of its own; an event waits on one of them (see
 //!   [`refine::event`](crate::refine::event) for what they measure).
-//! * Cancelling an event touches one byte. Each node has a *ticket*, each event the ticket of its node when it was
-//!   scheduled; cancelling changes the node's, and events with an old ticket are dropped when they come up.
+//! * Cancelling an event touches two bytes. Each node in play has a *ticket*, each event the ticket of its node when it
+//!   was scheduled; cancelling changes the node's, and events with an old ticket are dropped when they come up.
+//!
+//! Nodes are known by the slots of their records in the [`Front`](crate::front::Front), so tickets are as many as there
+//! are nodes in play and stay in a near cache.
 //!
 //! Events of the tick that a clock is in come up at every advance until that tick has passed: their deadline may
 //! lie anywhere in it.
 
-use vertex_tree::{Bounds, NONE, NodeId};
+use vertex_tree::{Bounds, prefetch};
+
+use crate::front::Slot;
 
 /// Ticks in a frame at full speed. A camera far below full speed still has ticks that are finer than its frames.
 pub const TICKS_PER_FRAME: f64 = 512.0;
 
 /// Slots a level. Deadlines go to the level on which they are at least half of this away.
 const SLOTS: u64 = 16;
-/// Level 44 reaches 2^47 ticks ahead. Whatever is further waits in its last slot, and is scheduled again.
-const LEVELS: usize = 44;
+/// Level 28 reaches 2^32 ticks ahead, which is further than any deadline: those are `u32` ticks ahead, and what is
+/// further is scheduled again.
+const LEVELS: usize = 29;
+/// The furthest that an event is scheduled ahead, in ticks: 4 million frames at full speed.
+pub const HORIZON: u32 = 1 << 31;
 
 /// Which status change an event waits for.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -45,7 +53,7 @@ pub struct Event {
     /// Sphere and error of the node.
     pub bounds: Bounds,
     /// The node to test.
-    pub node: NodeId,
+    pub slot: Slot,
     /// Twice the ticket, plus 1 where it waits for folding. No member is narrower than its neighbours, or copying an
     /// event would be several moves.
     tag: u32,
@@ -53,6 +61,13 @@ pub struct Event {
 }
 
 impl Event {
+    const BLANK: Self = Self {
+        bounds: Bounds { center: [0.0; 3], radius: 0.0, eps: 0.0 },
+        slot: Slot::NONE,
+        tag: 0,
+        _reserved: 0,
+    };
+
     /// What the test is for.
     #[inline(always)]
     #[must_use]
@@ -61,74 +76,77 @@ impl Event {
     }
 
     #[inline(always)]
-    fn ticket(&self) -> u8 {
-        (self.tag >> 1) as u8
+    fn ticket(&self) -> u16 {
+        (self.tag >> 1) as u16
     }
 }
 
 /// Events in a chunk.
-const CHUNK: usize = 15;
+const CHUNK: u32 = 16;
 
-/// Part of a bucket: 512 bytes.
-#[derive(Clone, Copy, Debug)]
-#[repr(C)]
-struct Chunk {
-    events: [Event; CHUNK],
-    len: u32,
-    /// The next chunk of the bucket, or of the free ones; [`NONE`] after the last.
-    next: u32,
-}
+/// A list of chunks of events, of which all but the newest are full: the place after its last event, counted through
+/// all chunks of the pool; 0 while it is empty.
+///
+/// To append is one store where the event goes and one here, in an array that is small enough to stay near. A count in
+/// the chunk itself would be a read that misses the cache, for every event.
+type Bucket = u32;
 
 /// Where all buckets keep their events. Chunks are used again last in, first out: what is written next was read just
 /// before and is in the nearest cache, and once there are enough of them nothing is allocated any more.
 #[derive(Debug)]
 struct Pool {
-    chunks: Vec<Chunk>,
-    free: u32,
+    /// The first one is not used, as place 0 says that a bucket is empty.
+    chunks: Vec<[Event; CHUNK as usize]>,
+    /// For each chunk, the one before it in its bucket, or 0.
+    previous: Vec<u32>,
+    free: Vec<u32>,
 }
 
 impl Pool {
-    /// Appends an event to the bucket whose newest chunk is `bucket`.
-    #[inline(always)]
-    fn push(&mut self, bucket: &mut u32, event: Event) {
-        if let Some(chunk) = self.chunks.get_mut(*bucket as usize)
-            && let Some(place) = chunk.events.get_mut(chunk.len as usize)
-        {
-            *place = event;
-            chunk.len += 1;
-        } else {
-            self.push_chunk(bucket, event);
-        }
+    fn new() -> Self {
+        Self { chunks: vec![[Event::BLANK; CHUNK as usize]], previous: vec![0], free: Vec::new() }
     }
 
-    fn push_chunk(&mut self, bucket: &mut u32, event: Event) {
-        let new = self.free;
-        if let Some(chunk) = self.chunks.get_mut(new as usize) {
-            self.free = std::mem::replace(&mut chunk.next, *bucket);
-            chunk.events[0] = event;
-            chunk.len = 1;
-            *bucket = new;
-        } else {
-            self.chunks.push(Chunk { events: [event; CHUNK], len: 1, next: *bucket });
-            *bucket = self.chunks.len() as u32 - 1;
+    #[inline(always)]
+    fn push(&mut self, bucket: &mut Bucket, event: Event) {
+        if bucket.is_multiple_of(CHUNK) {
+            self.open(bucket);
         }
+        self.chunks[(*bucket / CHUNK) as usize][(*bucket % CHUNK) as usize] = event;
+        *bucket += 1;
+    }
+
+    /// Adds an empty chunk to a bucket.
+    #[inline(never)]
+    fn open(&mut self, bucket: &mut Bucket) {
+        let previous = bucket.saturating_sub(1) / CHUNK;
+        let chunk = self.free.pop().unwrap_or_else(|| {
+            self.chunks.push([Event::BLANK; CHUNK as usize]);
+            self.previous.push(0);
+            self.chunks.len() as u32 - 1
+        });
+        self.previous[chunk as usize] = previous;
+        *bucket = chunk * CHUNK;
     }
 
     /// Moves the events of a bucket for which `keep` says so to `due`, and empties it. Returns how many there were.
     #[inline(always)]
-    fn take(&mut self, bucket: &mut u32, due: &mut Vec<Event>, keep: impl Fn(&Event) -> bool) -> usize {
+    fn take(&mut self, bucket: &mut Bucket, due: &mut Vec<Event>, keep: impl Fn(&Event) -> bool) -> usize {
         let mut count = 0;
-        while let Some(chunk) = self.chunks.get_mut(*bucket as usize) {
-            let events = &chunk.events[..chunk.len as usize];
+        let mut end = std::mem::take(bucket);
+        while end != 0 {
+            let chunk = (end - 1) / CHUNK;
+            let previous = self.previous[chunk as usize];
+            prefetch(&self.chunks, previous as usize);
+            let events = &self.chunks[chunk as usize][..(end - chunk * CHUNK) as usize];
             count += events.len();
-            due.reserve(events.len());
             for event in events {
                 if keep(event) {
                     due.push(*event);
                 }
             }
-            let next = std::mem::replace(&mut chunk.next, self.free);
-            self.free = std::mem::replace(bucket, next);
+            self.free.push(chunk);
+            end = if previous == 0 { 0 } else { (previous + 1) * CHUNK };
         }
         count
     }
@@ -137,8 +155,8 @@ impl Pool {
 /// Buckets of events on one clock.
 #[derive(Debug)]
 struct Wheel {
-    /// `levels[l][s]` is the newest chunk of the events whose deadline tick, divided by `2^l`, is `s` modulo 16.
-    levels: [[u32; SLOTS as usize]; LEVELS],
+    /// `levels[l][s]` has the events whose deadline tick, divided by `2^l`, is `s` modulo 16.
+    levels: [[Bucket; SLOTS as usize]; LEVELS],
     /// For each level, a bit for each slot that may hold events.
     occupied: [u16; LEVELS],
     /// The tick that the clock is in.
@@ -147,29 +165,24 @@ struct Wheel {
 
 impl Wheel {
     fn new() -> Self {
-        Self { levels: [[NONE; SLOTS as usize]; LEVELS], occupied: [0; LEVELS], tick: 0 }
+        Self { levels: [[0; SLOTS as usize]; LEVELS], occupied: [0; LEVELS], tick: 0 }
     }
 
+    /// Puts an event where it comes up before the clock is more than `ahead` ticks further.
     #[inline(always)]
-    fn push(&mut self, pool: &mut Pool, now: f64, frames: f64, event: Event) {
-        // Rounded down; `as` saturates, so that a bound of infinity is as late as can be.
-        let deadline = ((now + frames).next_down() * TICKS_PER_FRAME) as u64;
-        let ahead = deadline.saturating_sub(self.tick);
+    fn push(&mut self, pool: &mut Pool, ahead: u32, event: Event) {
+        let ahead = ahead.min(HORIZON);
+        let deadline = self.tick + u64::from(ahead);
         // On level l, `ahead` spans (ahead >> l) slots, and one more where it straddles their borders: at most 15.
-        let level = (64 - ahead.leading_zeros() as usize).saturating_sub(4);
-        let (mut level, deadline) = if level < LEVELS {
-            (level, self.tick + ahead)
-        } else {
-            (LEVELS - 1, self.tick + ((SLOTS - 2) << (LEVELS - 1)))
-        };
+        let mut level = (32 - ahead.leading_zeros() as usize).saturating_sub(4);
         level += usize::from((deadline >> level) - (self.tick >> level) >= SLOTS);
-        let slot = ((deadline >> level) % SLOTS) as usize;
+        let slot = (deadline >> level) % SLOTS;
         self.occupied[level] |= 1 << slot;
-        pool.push(&mut self.levels[level][slot], event);
+        pool.push(&mut self.levels[level][slot as usize], event);
     }
 
     /// Calls `take` with each bucket that the clock reaches on its way to `now`.
-    fn advance(&mut self, now: f64, take: &mut dyn FnMut(&mut u32)) {
+    fn advance(&mut self, now: f64, take: &mut dyn FnMut(&mut Bucket)) {
         let before = self.tick;
         let after = (now * TICKS_PER_FRAME) as u64;
         debug_assert!(after >= before, "the clock went back from tick {before} to {after}");
@@ -191,7 +204,7 @@ impl Wheel {
         }
     }
 
-    fn take(&mut self, level: usize, slot: usize, take: &mut dyn FnMut(&mut u32)) {
+    fn take(&mut self, level: usize, slot: usize, take: &mut dyn FnMut(&mut Bucket)) {
         if self.occupied[level] >> slot & 1 == 1 {
             self.occupied[level] &= !(1 << slot);
             take(&mut self.levels[level][slot]);
@@ -205,10 +218,10 @@ pub struct EventQueue {
     wheels: Vec<Wheel>,
     pool: Pool,
     /// Events to return at every advance.
-    pressing: u32,
+    pressing: Bucket,
     /// Kept between sweeps for its allocation.
     swept: Vec<Event>,
-    tickets: Vec<u8>,
+    tickets: Vec<u16>,
     /// Events in the buckets, cancelled ones included.
     stored: usize,
     /// An upper bound on the cancelled ones among them.
@@ -216,15 +229,15 @@ pub struct EventQueue {
 }
 
 impl EventQueue {
-    /// An empty queue for nodes with numbers less than `node_limit`, all its clocks at time 0.
+    /// An empty queue, all its clocks at time 0.
     #[must_use]
-    pub fn new(node_limit: u32, clocks: usize) -> Self {
+    pub fn new(clocks: usize) -> Self {
         Self {
             wheels: (0..clocks).map(|_| Wheel::new()).collect(),
-            pool: Pool { chunks: Vec::new(), free: NONE },
-            pressing: NONE,
+            pool: Pool::new(),
+            pressing: 0,
             swept: Vec::new(),
-            tickets: vec![0; node_limit as usize],
+            tickets: Vec::new(),
             stored: 0,
             cancelled: 0,
         }
@@ -242,28 +255,38 @@ impl EventQueue {
         self.stored == 0
     }
 
-    /// An event for `node`, to be scheduled; void once something cancels it.
+    /// An event for a node, to be scheduled; void once something cancels it.
     #[inline]
     #[must_use]
-    pub fn event(&self, node: NodeId, kind: Kind, bounds: Bounds) -> Event {
-        let tag = u32::from(self.tickets[node.index()]) << 1 | u32::from(kind == Kind::Fold);
-        Event { bounds, node, tag, _reserved: 0 }
+    pub fn event(&mut self, slot: Slot, kind: Kind, bounds: Bounds) -> Event {
+        if self.tickets.len() <= slot.index() {
+            self.tickets.resize(slot.index() + 1, 0);
+        }
+        let tag = u32::from(self.tickets[slot.index()]) << 1 | u32::from(kind == Kind::Fold);
+        Event { bounds, slot, tag, _reserved: 0 }
     }
 
     /// Whether nothing has cancelled an event since it was made.
     #[inline]
     #[must_use]
     pub fn is_valid(&self, event: &Event) -> bool {
-        self.tickets[event.node.index()] == event.ticket()
+        self.tickets[event.slot.index()] == event.ticket()
     }
 
-    /// Schedules an event that must not come up later than `frames` after the clock's present time `now`, which is
-    /// that of the last [`advance`](Self::advance). Does not touch the node, so that an event that has come up and led
-    /// to nothing can be scheduled again in passing.
+    /// Schedules an event that must not come up later than `frames` after the clock's time at the last
+    /// [`advance`](Self::advance). Does not touch the node, so that an event that has come up and led to nothing can be
+    /// scheduled again in passing.
     #[inline(always)]
-    pub fn schedule(&mut self, clock: usize, now: f64, frames: f64, event: Event) {
+    pub fn schedule(&mut self, clock: usize, frames: f64, event: Event) {
+        // Rounded down, as the clock's time is to its tick; `as` saturates.
+        self.schedule_ticks(clock, (frames * TICKS_PER_FRAME) as u32, event);
+    }
+
+    /// Schedules an event that must not come up more than so many ticks after the one that the clock is in.
+    #[inline(always)]
+    pub fn schedule_ticks(&mut self, clock: usize, ticks: u32, event: Event) {
         self.stored += 1;
-        self.wheels[clock].push(&mut self.pool, now, frames, event);
+        self.wheels[clock].push(&mut self.pool, ticks, event);
     }
 
     /// Schedules an event for the next advance of any clock and every advance after it, moved or not, until it is
@@ -273,10 +296,10 @@ impl EventQueue {
         self.pool.push(&mut self.pressing, event);
     }
 
-    /// Cancels whatever is scheduled for `node`.
+    /// Cancels whatever is scheduled for a node.
     #[inline]
-    pub fn cancel(&mut self, node: NodeId) {
-        let ticket = &mut self.tickets[node.index()];
+    pub fn cancel(&mut self, slot: Slot) {
+        let Some(ticket) = self.tickets.get_mut(slot.index()) else { return };
         *ticket = ticket.wrapping_add(1);
         let wrapped = *ticket == 0;
         self.cancelled += 1;
@@ -294,16 +317,21 @@ impl EventQueue {
         let buckets = wheels.iter_mut().flat_map(|wheel| wheel.levels.as_flattened_mut());
         for bucket in buckets.chain([pressing]) {
             swept.clear();
-            pool.take(bucket, swept, |event| tickets[event.node.index()] == event.ticket());
+            pool.take(bucket, swept, |event| tickets[event.slot.index()] == event.ticket());
             swept.iter().for_each(|&event| pool.push(bucket, event));
             self.stored += swept.len();
         }
         self.cancelled = 0;
     }
 
+    /// Reads the tickets of nodes into the cache that are about to be cancelled or given events.
+    pub(crate) fn prefetch(&self, slot: Slot) {
+        prefetch(&self.tickets, slot.index());
+    }
+
     /// Appends the pressing events to `due`, removing them.
     pub fn take_pressing(&mut self, due: &mut Vec<Event>) {
-        let mut pressing = std::mem::replace(&mut self.pressing, NONE);
+        let mut pressing = std::mem::take(&mut self.pressing);
         self.with_wheels(due, |_, take| take(&mut pressing));
     }
 
@@ -336,11 +364,15 @@ impl EventQueue {
 
     /// Calls `f` with the wheels and with what moves the valid events of a bucket to `due`.
     #[inline(always)]
-    fn with_wheels(&mut self, due: &mut Vec<Event>, f: impl FnOnce(&mut [Wheel], &mut dyn FnMut(&mut u32))) {
+    fn with_wheels(
+        &mut self,
+        due: &mut Vec<Event>,
+        f: impl FnOnce(&mut [Wheel], &mut dyn FnMut(&mut Bucket)),
+    ) {
         let Self { wheels, pool, tickets, stored, cancelled, .. } = self;
         f(wheels, &mut |bucket| {
             let before = due.len();
-            let taken = pool.take(bucket, due, |event| tickets[event.node.index()] == event.ticket());
+            let taken = pool.take(bucket, due, |event| tickets[event.slot.index()] == event.ticket());
             *stored -= taken;
             *cancelled = cancelled.saturating_sub(taken - (due.len() - before));
         });

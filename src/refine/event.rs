@@ -12,13 +12,14 @@
 //! the choice is free.
 
 use multiversion::multiversion;
-use vertex_tree::{Bounds, NodeId};
+use vertex_tree::Bounds;
 
 use super::{Flips, Frame};
 use crate::filter::{Lens, Lenses, earliest};
+use crate::front::Slot;
 use crate::motion::{Motion, Odometer, Speed, Travel};
 use crate::packed::{Block, LANES};
-use crate::queue::{Event, EventQueue, Kind};
+use crate::queue::{Event, EventQueue, Kind, TICKS_PER_FRAME};
 use crate::view::View;
 
 /// Clocks with `omega` taken down, and as many with `rho` taken down.
@@ -48,9 +49,9 @@ fn skew(speed: &Speed, clock: usize) -> Speed {
 }
 
 impl EventDriven {
-    pub fn new(node_limit: u32) -> Self {
+    pub fn new() -> Self {
         Self {
-            queue: EventQueue::new(node_limit, CLOCKS),
+            queue: EventQueue::new(CLOCKS),
             odometers: [Odometer::default(); CLOCKS],
             clock: SKEWED as usize,
             fresh: Vec::new(),
@@ -73,8 +74,8 @@ impl EventDriven {
         flips.tests += self.due.len() as u64;
         let due = std::mem::take(&mut self.due);
         self.process(&due, frame, |event, _| match event.kind() {
-            Kind::Unfold => flips.unfold.push(event.node),
-            Kind::Fold => flips.fold.push(event.node),
+            Kind::Unfold => flips.unfold.push(event.slot),
+            Kind::Fold => flips.fold.push(event.slot),
         });
         self.due = due;
     }
@@ -107,33 +108,38 @@ impl EventDriven {
     pub fn settle(&mut self, frame: &Frame) {
         let mut fresh = std::mem::take(&mut self.fresh);
         fresh.retain(|event| self.queue.is_valid(event));
-        let (clock, now) = (self.clock, self.odometers[self.clock].now());
+        let clock = self.clock;
         // A node that no view wants is active where another needs it: its time to fold is the next motion.
-        self.process(&fresh, frame, |event, queue| queue.schedule(clock, now, 0.0, *event));
+        self.process(&fresh, frame, |event, queue| queue.schedule_ticks(clock, 0, *event));
         fresh.clear();
         self.fresh = fresh;
     }
 
     /// Tests events, calls `flip` for those whose nodes should change and schedules the others.
     fn process(&mut self, due: &[Event], frame: &Frame, flip: impl FnMut(&Event, &mut EventQueue)) {
-        let (clock, now) = (self.clock, self.odometers[self.clock].now());
-        let bench = Bench { frame, speed: skew(&frame.speed, clock), clock, now };
+        let clock = self.clock;
+        let bench = Bench { frame, speed: skew(&frame.speed, clock), clock };
         match Lenses::new(frame.criterion, frame.views) {
             Some(lenses) => process(due, lenses.as_slice(), &bench, &mut self.queue, flip),
             None => process_plainly(due, &bench, &mut self.queue, flip),
         }
     }
 
-    pub fn watch(&mut self, node: NodeId, kind: Kind, bounds: Bounds) {
-        self.fresh.push(self.queue.event(node, kind, bounds));
+    pub fn watch(&mut self, slot: Slot, kind: Kind, bounds: Bounds) {
+        self.fresh.push(self.queue.event(slot, kind, bounds));
     }
 
-    pub fn unwatch(&mut self, node: NodeId) {
-        self.queue.cancel(node);
+    pub fn unwatch(&mut self, slot: Slot) {
+        self.queue.cancel(slot);
     }
 
-    pub fn refused(&mut self, node: NodeId, kind: Kind, bounds: Bounds) {
-        self.queue.press(self.queue.event(node, kind, bounds));
+    pub fn prefetch(&self, slot: Slot) {
+        self.queue.prefetch(slot);
+    }
+
+    pub fn refused(&mut self, slot: Slot, kind: Kind, bounds: Bounds) {
+        let event = self.queue.event(slot, kind, bounds);
+        self.queue.press(event);
     }
 }
 
@@ -143,7 +149,6 @@ struct Bench<'a> {
     /// Of the clock.
     speed: Speed,
     clock: usize,
-    now: f64,
 }
 
 #[multiversion(targets("x86_64+avx2", "x86_64+sse4.1"))]
@@ -162,7 +167,8 @@ fn process(
         let frames = earliest(&block, lenses, &bench.speed);
         for (event, &frames) in events.iter().zip(&frames) {
             if frames > 0.0 {
-                queue.schedule(bench.clock, bench.now, f64::from(frames), *event);
+                // To multiply by a power of two is exact.
+                queue.schedule_ticks(bench.clock, (frames * TICKS_PER_FRAME as f32) as u32, *event);
             } else {
                 test(event, bench, queue, &mut flip);
             }
@@ -189,7 +195,7 @@ fn test(
     queue: &mut EventQueue,
     flip: &mut impl FnMut(&Event, &mut EventQueue),
 ) {
-    let Bench { frame, speed, clock, now } = bench;
+    let Bench { frame, speed, clock } = bench;
     let frames = match event.kind() {
         Kind::Unfold => frame.criterion.earliest_unfold(frame.views, speed, &event.bounds),
         Kind::Fold => frame.criterion.earliest_fold(frame.views, speed, &event.bounds),
@@ -198,6 +204,6 @@ fn test(
     if frames == 0.0 && frame.unfold(&event.bounds) == (event.kind() == Kind::Unfold) {
         flip(event, queue);
     } else {
-        queue.schedule(*clock, *now, frames, *event);
+        queue.schedule(*clock, frames, *event);
     }
 }

@@ -9,6 +9,8 @@
 //! * the children of a node follow from the number of leaves on its left side;
 //! * the triangles that a node brings when it unfolds, sorted by node, are an interval too.
 
+use std::ops::Range;
+
 use vertex_tree::{Bounds, CollapseLog, LogError, NONE, NodeId};
 
 /// An inner node: one cache line that holds all that unfolding it asks for.
@@ -20,12 +22,19 @@ pub(crate) struct Node {
     pub pivot: u32,
     pub end: u32,
     pub parent: u32,
-    /// The triangles that the node brings start here; they end where those of the next node start.
-    pub triangles: u32,
+    /// Where the triangles start that the node brings, and in the lowest [`COUNT_BITS`] how many they are, up to
+    /// [`MANY`]: then they end where those of the next node start. Few bring more than two, and to look at the next
+    /// node would be another cache line.
+    triangles: u32,
     pub log_number: u32,
     /// Of the child with the kept vertex and of the other; meaningless where that is a leaf.
     pub child_bounds: [Bounds; 2],
 }
+
+const COUNT_BITS: u32 = 3;
+const MANY: u32 = (1 << COUNT_BITS) - 1;
+/// Triangles that the bits left over can number.
+const MOST_TRIANGLES: usize = 1 << (32 - COUNT_BITS);
 
 impl Node {
     const BLANK: Self = Self {
@@ -65,6 +74,12 @@ impl Hierarchy {
     /// What [`CollapseLog::forest`] finds wrong with it.
     pub fn new(log: &CollapseLog) -> Result<Self, LogError> {
         let forest = log.forest()?;
+        if log.mesh.triangles.len() >= MOST_TRIANGLES {
+            return Err(LogError::TooManyTriangles {
+                triangles: log.mesh.triangles.len(),
+                most: MOST_TRIANGLES - 1,
+            });
+        }
         let count = log.collapses.len();
         let vertices = log.mesh.positions.len();
 
@@ -176,8 +191,8 @@ impl Hierarchy {
         for n in 0..=count {
             start[n + 1] += start[n];
         }
-        for (node, &at) in self.nodes.iter_mut().zip(&start) {
-            node.triangles = at;
+        for (node, bounds) in self.nodes.iter_mut().zip(start.windows(2)) {
+            node.triangles = bounds[0] << COUNT_BITS | (bounds[1] - bounds[0]).min(MANY);
         }
         self.refining = start[count];
         self.corners = vec![[0; 3]; triangles.len()];
@@ -213,6 +228,22 @@ impl Hierarchy {
             n = self.nodes[n as usize].parent;
         }
         n
+    }
+
+    /// Where the triangles that a node brings start.
+    pub(crate) fn first_brought(&self, node: usize) -> u32 {
+        self.nodes[node].triangles >> COUNT_BITS
+    }
+
+    /// The triangles that a node brings.
+    pub(crate) fn brought(&self, node: usize) -> Range<u32> {
+        let start = self.first_brought(node);
+        let end = match self.nodes[node].triangles & MANY {
+            MANY if node + 1 < self.nodes.len() => self.first_brought(node + 1),
+            MANY => self.refining,
+            count => start + count,
+        };
+        start..end
     }
 
     /// Number in the collapse log of a node of this backend.

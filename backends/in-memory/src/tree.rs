@@ -4,7 +4,7 @@ use std::sync::Arc;
 
 use vertex_tree::{
     Bounds, LeafTriangle, MeshSink, NONE, NodeId, PageStats, StarMesh, Step, TreeError, TriangleId, VertexId,
-    VertexTree,
+    VertexTree, prefetch,
 };
 
 use crate::Hierarchy;
@@ -51,12 +51,6 @@ impl InMemoryTree {
 
     fn node(&self, node: NodeId) -> &Node {
         &self.hierarchy.nodes[node.index()]
-    }
-
-    /// The triangles that a node brings.
-    fn brought(&self, node: NodeId) -> std::ops::Range<u32> {
-        let end = self.hierarchy.nodes.get(node.index() + 1).map_or(self.hierarchy.refining, |n| n.triangles);
-        self.hierarchy.nodes[node.index()].triangles..end
     }
 }
 
@@ -129,7 +123,7 @@ impl VertexTree for InMemoryTree {
     }
 
     fn unfold<M: MeshSink>(&mut self, node: NodeId, mesh: &mut M) -> Result<Step, TreeError> {
-        let brought = self.brought(node);
+        let brought = self.hierarchy.brought(node.index());
         self.displayed += brought.len() as u64;
         let Some(stars) = self.mesh.as_mut().filter(|_| M::KEEPS_MESH) else { return Ok(Step::Done) };
         let h = &*self.hierarchy;
@@ -140,11 +134,35 @@ impl VertexTree for InMemoryTree {
     }
 
     fn fold<M: MeshSink>(&mut self, node: NodeId, mesh: &mut M) -> Result<Step, TreeError> {
-        self.displayed -= self.brought(node).len() as u64;
+        self.displayed -= self.hierarchy.brought(node.index()).len() as u64;
         let Some(stars) = self.mesh.as_mut().filter(|_| M::KEEPS_MESH) else { return Ok(Step::Done) };
         let Node { first: kept, pivot: removed, .. } = self.hierarchy.nodes[node.index()];
         stars.merge([kept, removed], mesh);
         Ok(Step::Done)
+    }
+
+    fn prepare<M: MeshSink>(&self, nodes: &[NodeId], mesh: &M) {
+        let h = &*self.hierarchy;
+        nodes.iter().for_each(|node| prefetch(&h.nodes, node.index()));
+        let Some(stars) = &self.mesh else { return };
+        for node in nodes {
+            let Node { pivot: removed, .. } = h.nodes[node.index()];
+            stars.prefetch_vertex(h.nodes[node.index()].first);
+            stars.prefetch_vertex(removed);
+            prefetch(&h.positions, removed as usize);
+            prefetch(&h.corners, h.first_brought(node.index()) as usize);
+        }
+        for node in nodes {
+            stars.prefetch_star(h.nodes[node.index()].first);
+            stars.prefetch_star(h.nodes[node.index()].pivot);
+        }
+        for node in nodes {
+            stars.prefetch_triangles(h.nodes[node.index()].first, mesh);
+            stars.prefetch_triangles(h.nodes[node.index()].pivot, mesh);
+            for triangle in h.brought(node.index()) {
+                h.corners[triangle as usize].iter().for_each(|&leaf| stars.prefetch_leaf(leaf));
+            }
+        }
     }
 
     fn end_frame(&mut self) -> Result<PageStats, TreeError> {

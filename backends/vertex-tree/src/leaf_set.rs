@@ -1,5 +1,7 @@
 //! A set of leaf numbers that answers "the largest member that is not above x" in a few words.
 
+use crate::prefetch;
+
 /// A set of numbers below a fixed limit: a tree of 64-way bit masks.
 ///
 /// The front's vertices are kept in one: numbered depth-first, the vertex that stands for a leaf is the nearest one
@@ -21,6 +23,12 @@ impl LeafSet {
                 return Self { levels };
             }
         }
+    }
+
+    /// Starts to read the lowest word that a look-up will read.
+    #[inline(always)]
+    pub fn prefetch(&self, number: u32) {
+        prefetch(&self.levels[0], number as usize / 64);
     }
 
     pub fn insert(&mut self, number: u32) {

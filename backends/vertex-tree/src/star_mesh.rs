@@ -16,7 +16,7 @@
 
 use crate::leaf_set::LeafSet;
 use crate::stars::{Corner, Stars, corner, triangle_of};
-use crate::{MeshSink, NONE, TriangleId, VertexId};
+use crate::{MeshSink, NONE, TriangleId, VertexId, prefetch};
 
 /// A triangle of the hierarchy.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -218,6 +218,38 @@ impl StarMesh {
         self.holes.push(t as u32);
         self.displayed -= 1;
         mesh.triangle_removed(t as u32);
+    }
+
+    /// Starts to read where the vertex of a leaf is: the first of three steps before a split or a merge, each of which
+    /// needs what the one before has fetched.
+    #[inline(always)]
+    pub fn prefetch_vertex(&self, leaf: u32) {
+        prefetch(&self.vertex_of_leaf, leaf as usize);
+    }
+
+    /// Starts to read the star of the vertex of a leaf, if that is shown.
+    #[inline(always)]
+    pub fn prefetch_star(&self, leaf: u32) {
+        self.stars.prefetch(self.vertex_of_leaf[leaf as usize]);
+    }
+
+    /// Starts to read the triangles around the vertex of a leaf, if that is shown.
+    #[inline(always)]
+    pub fn prefetch_triangles<M: MeshSink>(&self, leaf: u32, mesh: &M) {
+        let vertex = self.vertex_of_leaf[leaf as usize];
+        if vertex != NONE {
+            for &corner in self.stars.corners(vertex) {
+                let (t, _) = triangle_of(corner);
+                prefetch(&self.triangles, t);
+                mesh.prefetch(t as u32);
+            }
+        }
+    }
+
+    /// Starts to read what says where a corner with this leaf is shown.
+    #[inline(always)]
+    pub fn prefetch_leaf(&self, leaf: u32) {
+        self.shown.prefetch(leaf);
     }
 
     /// Gives up the last slot; what is in it moves into a hole.

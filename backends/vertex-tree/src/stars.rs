@@ -2,7 +2,7 @@
 //!
 //! Most vertices have about six. A star of up to 14 lies in one cache line; a larger one moves to a list of its own.
 
-use crate::NONE;
+use crate::{NONE, prefetch};
 
 /// Corner `c` of the triangle in slot `t` is numbered `4 t + c`: the triangle is found by a shift.
 pub(crate) type Corner = u32;
@@ -75,6 +75,11 @@ impl Stars {
     #[inline(always)]
     pub fn leaf(&self, slot: u32) -> u32 {
         self.stars[slot as usize].leaf
+    }
+
+    #[inline(always)]
+    pub fn prefetch(&self, slot: u32) {
+        prefetch(&self.stars, slot as usize);
     }
 
     #[inline(always)]

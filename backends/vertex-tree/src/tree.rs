@@ -129,8 +129,8 @@ pub trait VertexTree {
 
     /// Says that these nodes are about to be folded or unfolded: a chance to fetch what that takes into the caches, for
     /// all of them at once. Changes nothing.
-    fn prepare(&self, nodes: &[NodeId]) {
-        let _ = nodes;
+    fn prepare<M: MeshSink>(&self, nodes: &[NodeId], mesh: &M) {
+        let _ = (nodes, mesh);
     }
     /// Says that `node` can not be unfolded before `ticks` ticks of the engine's clock have passed: a prefetch hint.
     fn will_need(&mut self, node: NodeId, ticks: u32) {
