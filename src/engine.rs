@@ -210,6 +210,11 @@ impl<T: VertexTree, M: MeshSink> Engine<T, M> {
         &self.tree
     }
 
+    /// The backend, to change between two frames what it is allowed, or to [wait](VertexTree::settle) for its pages.
+    pub fn tree_mut(&mut self) -> &mut T {
+        &mut self.tree
+    }
+
     /// The displayed mesh.
     pub fn mesh(&self) -> &M {
         &self.mesh
