@@ -21,6 +21,7 @@
 //! of what is wanted under "`p` needs the parents of `N(p)`", whatever the order; and since what is needed has a
 //! larger number, it ends. A collapse that the second rule forbids is still needed by a neighbour that is finer.
 
+use rustc_hash::FxHashMap;
 use vertex_tree::{NONE, NodeId, StarMesh, Step, VertexId};
 
 /// What is done about neighbours that are too coarse or too fine for a change.
@@ -58,16 +59,42 @@ pub(crate) struct Rules {
     /// Vertices of the input.
     leaves: u32,
     shown: Vec<Shown>,
+    /// For each node in play, the one above, [`NONE`] for a root: what is needed may be on a page that has gone.
+    above: FxHashMap<NodeId, NodeId>,
 }
 
 impl Rules {
     pub fn new(dependencies: Dependencies, leaves: u32) -> Option<Self> {
         let forces = dependencies == Dependencies::Force;
-        (dependencies != Dependencies::Off).then_some(Self { forces, leaves, shown: Vec::new() })
+        (dependencies != Dependencies::Off).then_some(Self {
+            forces,
+            leaves,
+            shown: Vec::new(),
+            above: FxHashMap::default(),
+        })
     }
 
     fn number(&self, collapse: u32) -> u32 {
         self.leaves.saturating_add(collapse)
+    }
+
+    /// A node comes into play below another.
+    pub fn enter(&mut self, half: Half, above: Option<NodeId>) {
+        if let Some((node, _)) = half {
+            self.above.insert(node, above.unwrap_or(NodeId(NONE)));
+        }
+    }
+
+    /// A node goes out of play.
+    pub fn leave(&mut self, half: Half) {
+        if let Some((node, _)) = half {
+            self.above.remove(&node);
+        }
+    }
+
+    /// The node above one that is in play; a number that is none for a root.
+    pub fn above(&self, node: NodeId) -> Option<NodeId> {
+        self.above.get(&node).copied()
     }
 
     /// What is shown in a slot changes. `parent` is a number in the log, if there is a parent.

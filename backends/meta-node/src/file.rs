@@ -41,9 +41,9 @@ impl MetaNodeFile {
         let header = Header::read(&*source)?;
         let mut words = vec![0; (header.tables_bytes() / 4) as usize];
         read_words(&*source, HEADER_BYTES, &mut words)?;
-        let file = || source.name().to_owned();
         if table_checksum(&words) != header.tables_checksum {
-            return Err(MetaNodeError::Checksum { file: file(), offset: HEADER_BYTES, section: "tables" });
+            let file = source.name().to_owned();
+            return Err(MetaNodeError::Checksum { file, offset: HEADER_BYTES, section: "tables" });
         }
         let (roots, rest) = words.split_at(header.roots as usize * ROOT_WORDS);
         let (vertices, rest) = rest.split_at(header.base_vertices as usize * VERTEX_WORDS);
@@ -69,15 +69,8 @@ impl MetaNodeFile {
             }
             total += u64::from(length);
         }
-        let opened = Self {
-            header,
-            roots,
-            base_vertices,
-            base_triangles,
-            lengths: lengths.to_vec(),
-            starts,
-            source: source.clone(),
-        };
+        let opened =
+            Self { header, roots, base_vertices, base_triangles, lengths: lengths.to_vec(), starts, source };
         opened.check_tables(total)?;
         Ok(opened)
     }

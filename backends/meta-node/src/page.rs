@@ -42,7 +42,7 @@
 //! to the node that splits, and is stored once in the whole file. Coordinates are stored for the leaves of a block
 //! alone, as there: one a node, its removed vertex. The kept one has come from above.
 
-use vertex_tree::{Bounds, NONE, NodeId};
+use vertex_tree::{Bounds, NONE, NodeId, prefetch};
 
 /// Words before the nodes.
 pub(crate) const HEADER_WORDS: usize = 9;
@@ -119,6 +119,14 @@ impl<'a> Page<'a> {
     pub fn node(self, slot: u32) -> Node<'a> {
         let at = HEADER_WORDS + NODE_WORDS * slot as usize;
         Node { words: &self.words[at..at + NODE_WORDS] }
+    }
+
+    /// Starts to read the node in a slot into the cache, and what follows it.
+    #[inline(always)]
+    pub fn prefetch(self, slot: u32) {
+        let at = HEADER_WORDS + NODE_WORDS * slot as usize;
+        prefetch(self.words, at);
+        prefetch(self.words, at + NODE_WORDS - 1);
     }
 
     /// The node above a block's topmost one, and its number in the log.

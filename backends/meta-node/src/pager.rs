@@ -26,7 +26,7 @@ use std::collections::VecDeque;
 use std::sync::Arc;
 
 use rustc_hash::FxHashMap;
-use vertex_tree::{NONE, PageStats};
+use vertex_tree::{NONE, PageStats, prefetch};
 
 use crate::board::{Board, Command, Done};
 use crate::error::MetaNodeError;
@@ -227,6 +227,17 @@ impl Pager {
         }
     }
 
+    /// Asks for every page for which there is a place.
+    pub fn load_all(&mut self) {
+        for page in 0..self.file.header.pages {
+            if self.table[page as usize] == NONE && !self.rests(page) {
+                let Some(holder) = self.takeable(Class::Free, self.frame) else { break };
+                self.ask(page, holder, false);
+            }
+        }
+        self.post();
+    }
+
     /// Takes back a place holder that is to be filled with something not urgent.
     fn withdraw(&mut self) -> Option<u32> {
         let at = self.outbox.iter().rposition(|command| !command.urgent);
@@ -250,6 +261,19 @@ impl Pager {
     pub fn page(&self, holder: u32) -> Page<'_> {
         let holder = &self.holders[holder as usize];
         Page { words: &holder.words, layout: &holder.layout }
+    }
+
+    /// Starts to read where a page is into the cache.
+    #[inline(always)]
+    pub fn prefetch_table(&self, page: u32) {
+        prefetch(&self.table, page as usize);
+        prefetch(&self.usage, page as usize);
+    }
+
+    /// Starts to read what is known of a place holder into the cache.
+    #[inline(always)]
+    pub fn prefetch_holder(&self, holder: u32) {
+        prefetch(&self.holders, holder as usize);
     }
 
     /// A change has been made on a page: what is around it may be needed soon.

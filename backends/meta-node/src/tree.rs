@@ -84,6 +84,12 @@ impl MetaNodeTree {
         self.pager.set_page_memory(bytes)
     }
 
+    /// Asks for every page for which there is a free place. Once these have [come](VertexTree::settle), a tree with memory
+    /// for everything misses nothing.
+    pub fn load_all(&mut self) {
+        self.pager.load_all();
+    }
+
     /// What the last read that failed found, if any has.
     #[must_use]
     pub fn last_fault(&self) -> Option<&MetaNodeError> {
@@ -118,20 +124,6 @@ impl MetaNodeTree {
         let layout = file.read_page(page, &mut words).ok().filter(|layout| slot < layout.nodes)?;
         let page = Page { words: &words, layout: &layout };
         Some(f(page, page.node(slot)))
-    }
-
-    /// The children that are nodes, with their numbers in the log.
-    #[inline(always)]
-    fn halves(&self, node: NodeId, page: Page, of: Node) -> [Half; 2] {
-        let base = node.0 >> self.slot_bits << self.slot_bits;
-        of.children().map(|child| match child {
-            Child::Leaf => None,
-            Child::Slot(slot) => Some((NodeId(base | slot), page.node(slot).log_number())),
-            Child::Link(link) => {
-                let link = page.link(link);
-                Some((link.node, link.log_number))
-            }
-        })
     }
 
     /// The place holder of a node's page. If it is missing, it is asked for.
@@ -231,6 +223,9 @@ impl VertexTree for MetaNodeTree {
     #[inline]
     fn parents(&self, node: NodeId) -> impl Iterator<Item = NodeId> {
         let base = node.0 >> self.slot_bits << self.slot_bits;
+        if let Some(above) = self.rules.as_ref().and_then(|rules| rules.above(node)) {
+            return Some(above).filter(|above| above.0 != vertex_tree::NONE).into_iter();
+        }
         let parent = self.look(node, |page, of| match of.parent() {
             Ok(slot) => base | slot,
             Err(block) => page.above(block).0,
@@ -256,6 +251,7 @@ impl VertexTree for MetaNodeTree {
             let half = roots.next().map(|root| (root.node, root.log_number));
             if let Some(rules) = &mut self.rules {
                 rules.show(vertex, leaf, half, None);
+                rules.enter(half, None);
             }
         }
         for &leaves in &file.base_triangles {
@@ -273,11 +269,11 @@ impl VertexTree for MetaNodeTree {
             return Err(self.damaged(own));
         }
         let of = page.node(slot);
-        let (children, leaves @ [kept, removed]) = (of.children(), of.leaves());
+        let (children, leaves) = (of.children(), of.leaves());
         let (start, end) = page.brought_range(slot);
         if let Some(stars) = &mut self.mesh {
             if let Some(rules) = &self.rules
-                && let Some(step) = rules.may_split(of.log_number(), kept, stars)
+                && let Some(step) = rules.may_split(of.log_number(), leaves[0], stars)
             {
                 return Ok(step);
             }
@@ -285,13 +281,10 @@ impl VertexTree for MetaNodeTree {
             stars.split(leaves, of.position(), brought, mesh);
         }
         self.displayed += u64::from(end - start);
-        if self.rules.is_some() {
-            let parent = Some(of.log_number());
-            let halves = self.halves(node, page, of);
-            if let (Some(rules), Some(stars)) = (&mut self.rules, &self.mesh) {
-                for (leaf, half) in [kept, removed].into_iter().zip(halves) {
-                    rules.show(stars.vertex(leaf), leaf, half, parent);
-                }
+        if let (Some(rules), Some(stars)) = (&mut self.rules, &self.mesh) {
+            for (leaf, half) in leaves.into_iter().zip(halves(node.0 - slot, page, of)) {
+                rules.show(stars.vertex(leaf), leaf, half, Some(of.log_number()));
+                rules.enter(half, Some(node));
             }
         }
         self.pager.touch(holder);
@@ -317,6 +310,7 @@ impl VertexTree for MetaNodeTree {
             }
             stars.merge(leaves, mesh);
             if let Some(rules) = &mut self.rules {
+                halves(node.0 - slot, page, of).into_iter().for_each(|half| rules.leave(half));
                 let parent = match of.parent() {
                     Ok(slot) => Some(page.node(slot).log_number()),
                     Err(block) => Some(page.above(block).1).filter(|&above| above != vertex_tree::NONE),
@@ -330,13 +324,34 @@ impl VertexTree for MetaNodeTree {
         Ok(Step::Done)
     }
 
-    fn prepare(&self, nodes: &[NodeId]) {
-        let read = |node: &NodeId| {
-            let (page, slot) = self.place(*node);
-            let page = self.pager.find(page).map(|holder| self.pager.page(holder))?;
-            (slot < page.layout.nodes).then(|| page.node(slot).log_number())
+    fn prepare<M: MeshSink>(&self, nodes: &[NodeId], mesh: &M) {
+        // One step of the chain of references for all nodes before the next for any.
+        nodes.iter().for_each(|&node| self.pager.prefetch_table(self.place(node).0));
+        let found = |&node: &NodeId| {
+            let (page, slot) = self.place(node);
+            self.pager.find(page).map(|holder| (holder, slot))
         };
-        std::hint::black_box(nodes.iter().filter_map(read).fold(0, |sum, number| sum ^ number));
+        for (holder, _) in nodes.iter().filter_map(found) {
+            self.pager.prefetch_holder(holder);
+        }
+        for (holder, slot) in nodes.iter().filter_map(found) {
+            self.pager.page(holder).prefetch(slot);
+        }
+        let Some(stars) = &self.mesh else { return };
+        let leaves = |node: &NodeId| {
+            let (holder, slot) = found(node)?;
+            let page = self.pager.page(holder);
+            (slot < page.layout.nodes).then(|| page.node(slot).leaves())
+        };
+        for leaf in nodes.iter().filter_map(leaves).flatten() {
+            stars.prefetch_vertex(leaf);
+        }
+        for leaf in nodes.iter().filter_map(leaves).flatten() {
+            stars.prefetch_star(leaf);
+        }
+        for leaf in nodes.iter().filter_map(leaves).flatten() {
+            stars.prefetch_triangles(leaf, mesh);
+        }
     }
 
     fn begin_frame(&mut self, arrived: &mut Vec<NodeId>) -> Result<(), TreeError> {
@@ -363,4 +378,16 @@ impl VertexTree for MetaNodeTree {
     fn end_frame(&mut self) -> Result<PageStats, TreeError> {
         Ok(self.pager.end_frame())
     }
+}
+
+/// The children of a node that are nodes, with their numbers in the log; `base` is the number of the page's first slot.
+fn halves(base: u32, page: Page, of: Node) -> [Half; 2] {
+    of.children().map(|child| match child {
+        Child::Leaf => None,
+        Child::Slot(slot) => Some((NodeId(base | slot), page.node(slot).log_number())),
+        Child::Link(link) => {
+            let link = page.link(link);
+            Some((link.node, link.log_number))
+        }
+    })
 }
