@@ -14,7 +14,6 @@ use crate::page::{self, Child};
 
 /// How a file is laid out.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-#[non_exhaustive]
 pub struct BuildOptions {
     /// Levels of the binary tree in a block, 1 to 12; `None` takes the most with which every block fits a page.
     pub levels: Option<u32>,
