@@ -125,8 +125,25 @@ impl<'a> Page<'a> {
     #[inline(always)]
     pub fn prefetch(self, slot: u32) {
         let at = HEADER_WORDS + NODE_WORDS * slot as usize;
-        prefetch(self.words, at);
+        prefetch(self.words, at - 1);
         prefetch(self.words, at + NODE_WORDS - 1);
+    }
+
+    /// Starts to read what is known of the children of the node in a slot.
+    #[inline(always)]
+    pub fn prefetch_children(self, slot: u32) {
+        if slot >= self.layout.nodes {
+            return;
+        }
+        for child in self.node(slot).children() {
+            let (at, words) = match child {
+                Child::Leaf => continue,
+                Child::Slot(child) => (HEADER_WORDS + NODE_WORDS * child as usize, 5),
+                Child::Link(link) => (self.layout.links_at as usize + LINK_WORDS * link as usize, LINK_WORDS),
+            };
+            prefetch(self.words, at);
+            prefetch(self.words, at + words - 1);
+        }
     }
 
     /// The node above a block's topmost one, and its number in the log.

@@ -184,6 +184,9 @@ impl Pager {
             let least = each * u64::from(LEAST_HOLDERS);
             return Err(MetaNodeError::Memory { given: bytes, least, holders: LEAST_HOLDERS });
         }
+        if self.is_complete() && allowed < self.file.header.pages {
+            self.recount();
+        }
         self.allowed = allowed;
         // Roots stay, unless a forest of thousands of trees would leave no room for anything else.
         let roots = self.file.header.root_pages;
@@ -263,6 +266,29 @@ impl Pager {
         Page { words: &holder.words, layout: &holder.layout }
     }
 
+    /// Whether every page is in memory. Then nothing is asked for and nothing evicted until less memory is allowed, and
+    /// neither lists nor reference counts are kept: see [`recount`](Self::recount).
+    #[inline(always)]
+    fn is_complete(&self) -> bool {
+        self.resident == self.file.header.pages
+    }
+
+    /// Makes reference counts and lists what the usage counts ask for.
+    fn recount(&mut self) {
+        self.references.fill(0);
+        self.holders.iter_mut().for_each(|holder| holder.counted = false);
+        for page in 0..self.file.header.pages {
+            self.classify(page);
+        }
+        for page in 0..self.file.header.pages {
+            if self.usage[page as usize] > 0
+                && let Some(holder) = self.find(page)
+            {
+                self.count_around(holder, true);
+            }
+        }
+    }
+
     /// Starts to read where a page is into the cache.
     #[inline(always)]
     pub fn prefetch_table(&self, page: u32) {
@@ -279,17 +305,13 @@ impl Pager {
     /// A change has been made on a page: what is around it may be needed soon.
     #[inline(always)]
     pub fn touch(&mut self, holder: u32) {
-        if self.holders[holder as usize].touched != self.frame {
+        if !self.is_complete() && self.holders[holder as usize].touched != self.frame {
             self.touch_first(holder);
         }
     }
 
     fn touch_first(&mut self, holder: u32) {
         self.holders[holder as usize].touched = self.frame;
-        if self.resident == self.file.header.pages {
-            // Nothing is missing and nothing will be evicted: order does not matter.
-            return;
-        }
         if let Some(class) = self.lists.class(holder) {
             self.lists.push(holder, class);
         }
@@ -309,7 +331,7 @@ impl Pager {
         // A count never exceeds the children of the nodes on a page.
         let now = (i32::from(before) + by) as u16;
         self.usage[page as usize] = now;
-        if (before == 0) != (now == 0) {
+        if (before == 0) != (now == 0) && !self.is_complete() {
             self.switch_usage(page, now > 0);
         }
     }

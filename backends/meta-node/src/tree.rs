@@ -337,6 +337,9 @@ impl VertexTree for MetaNodeTree {
         for (holder, slot) in nodes.iter().filter_map(found) {
             self.pager.page(holder).prefetch(slot);
         }
+        for (holder, slot) in nodes.iter().filter_map(found) {
+            self.pager.page(holder).prefetch_children(slot);
+        }
         let Some(stars) = &self.mesh else { return };
         let leaves = |node: &NodeId| {
             let (holder, slot) = found(node)?;
