@@ -2,7 +2,7 @@
 //!
 //! As in El-Sana & Chiang (2000), section 3.2, every subtree of `L` levels is a block, from the roots down. Trees of
 //! real meshes are ragged, and most blocks are small fragments at their lower ends. So blocks that hang below the same
-//! page, next to each other in depth-first order, go into one page while they fit; the roots of the trees hang
+//! page go into one page while they fit; the roots of the trees hang
 //! below nothing and are packed likewise. Such a page takes the part of the paper's meta-node: it is what is read, kept
 //! in a place holder and counted.
 //!
@@ -103,8 +103,10 @@ pub(crate) fn levels_for(arrangement: &Arrangement, page_bytes: u32) -> u32 {
 impl Blocking {
     /// Blocks of `levels` levels on pages of about `page_bytes`; larger ones where a single block is larger.
     pub fn new(arrangement: &Arrangement, levels: u32, page_bytes: u32) -> Self {
-        let most = largest(arrangement, levels).nodes.max(1);
-        let slot_bits = most.next_power_of_two().trailing_zeros();
+        // Slots enough for the largest block, and for as many of the smallest nodes as a page can hold.
+        let most =
+            largest(arrangement, levels).nodes.max(page_bytes as usize / 4 / page::block_words(1, 0, 0));
+        let slot_bits = most.max(1).next_power_of_two().trailing_zeros().min(page::MOST_LEVELS);
         let mut blocking = Self {
             levels,
             slot_bits,
@@ -139,25 +141,34 @@ impl Blocking {
         blocking
     }
 
-    /// Makes pages of blocks, given by their topmost nodes, in order.
+    /// Makes pages of blocks, given by their topmost nodes: each goes to the first page, of those begun here, that has room
+    /// for it. Blocks stay in order on their page.
     fn pack(&mut self, arrangement: &Arrangement, tops: &[u32], parent: u32, room: Size) {
-        let mut used = Size::default();
+        let mut begun: Vec<(Size, Vec<u32>)> = Vec::new();
+        // Only the last few are tried: packing stays linear. Roots keep their order.
+        let (mut open, tried) = (0, if parent == NONE { 1 } else { TRIED });
         for &top in tops {
             let size = size(arrangement, top, self.levels);
-            let both = used.and(size);
-            let fits = both.nodes <= room.nodes && both.words + page::HEADER_WORDS <= room.words;
-            let at = self.blocks.len();
-            match self.pages.last_mut() {
-                Some(page) if used.nodes > 0 && fits => {
-                    page.blocks.end += 1;
-                    used = both;
+            let fits = |used: &Size| {
+                let both = used.and(size);
+                both.nodes <= room.nodes && both.words + page::HEADER_WORDS <= room.words
+            };
+            open = open.max(begun.len().saturating_sub(tried));
+            match begun[open..].iter_mut().find(|(used, _)| fits(used)) {
+                Some((used, blocks)) => {
+                    *used = used.and(size);
+                    blocks.push(top);
                 }
-                _ => {
-                    self.pages.push(PageNodes { blocks: at..at + 1, parent, children: 0..0 });
-                    used = size;
-                }
+                None => begun.push((size, vec![top])),
             }
-            self.blocks.push(top);
+        }
+        for (_, blocks) in begun {
+            let start = self.blocks.len();
+            self.blocks.extend(blocks);
+            self.pages.push(PageNodes { blocks: start..self.blocks.len(), parent, children: 0..0 });
         }
     }
 }
+
+/// Pages that are tried for a block before another is begun.
+const TRIED: usize = 8;

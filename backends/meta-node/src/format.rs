@@ -195,7 +195,7 @@ impl Header {
                 "the number of base triangles",
                 self.base_triangles,
                 0,
-                limit(self.triangles - self.doubled),
+                limit(self.triangles.saturating_sub(self.doubled)),
             ),
             (44, "the number of pages", self.pages, u64::from(self.collapses > 0), limit(self.collapses)),
             (48, "the number of root pages", self.root_pages, u64::from(self.pages > 0), limit(self.pages)),

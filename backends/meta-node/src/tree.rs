@@ -90,6 +90,12 @@ impl MetaNodeTree {
         self.pager.load_all();
     }
 
+    /// Whether a node's page is in memory.
+    #[must_use]
+    pub fn is_resident(&self, node: NodeId) -> bool {
+        self.pager.find(self.place(node).0).is_some()
+    }
+
     /// What the last read that failed found, if any has.
     #[must_use]
     pub fn last_fault(&self) -> Option<&MetaNodeError> {
