@@ -295,6 +295,7 @@ impl VertexTree for MetaNodeTree {
         }
         self.pager.touch(holder);
         self.count(node, children, holder, 1);
+        self.pager.look_ahead(holder, slot);
         Ok(Step::Done)
     }
 
