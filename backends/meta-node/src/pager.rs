@@ -120,6 +120,8 @@ pub(crate) struct Pager {
     /// Place holders with a page, and those on their way.
     resident: u32,
     pending: u32,
+    /// A place holder whose page is asking for those around it: it does not make room for them.
+    guarded: u32,
     given_up: VecDeque<u32>,
     failures: FxHashMap<u32, Failure>,
     outbox: Vec<Command>,
@@ -149,13 +151,14 @@ impl Pager {
             usage: vec![0; pages],
             references: vec![0; pages],
             holders: Vec::new(),
-            lists: Lists::new(pages.max(LEAST_HOLDERS as usize)),
+            lists: Lists::new(pages + LEAST_HOLDERS as usize),
             allowed: 0,
             live: 0,
             retired: Vec::new(),
             kept: 0,
             resident: 0,
             pending: 0,
+            guarded: NONE,
             given_up: VecDeque::new(),
             failures: FxHashMap::default(),
             outbox: Vec::new(),
@@ -189,7 +192,8 @@ impl Pager {
     /// Sets how much memory the place holders may take. Less than now takes effect at once.
     pub fn set_page_memory(&mut self, bytes: u64) -> Result<(), MetaNodeError> {
         let each = self.file.holder_bytes();
-        let most = self.file.header.pages.max(LEAST_HOLDERS);
+        // With every page in use, three more are what the three-free rule asks for. Their memory is never taken.
+        let most = self.file.header.pages.saturating_add(LEAST_HOLDERS);
         let allowed = u32::try_from(bytes / each).unwrap_or(u32::MAX).min(most);
         if allowed < LEAST_HOLDERS {
             let least = each * u64::from(LEAST_HOLDERS);
@@ -392,6 +396,10 @@ impl Pager {
             return;
         }
         let Layout { parent, first_child, children, .. } = *layout;
+        let guarded = self.guarded;
+        if in_use {
+            self.guarded = holder;
+        }
         let parent = Some(parent).filter(|&parent| parent != NONE);
         for page in parent.into_iter().chain(first_child..first_child + children) {
             let count = &mut self.references[page as usize];
@@ -403,6 +411,7 @@ impl Pager {
                 }
             }
         }
+        self.guarded = guarded;
     }
 
     /// Puts a page's place holder into the list where it belongs.
@@ -444,7 +453,9 @@ impl Pager {
     /// The first place holder of a list, if it may be taken: not if it has been touched in this frame, or has come in
     /// answer to an urgent request at its start.
     fn takeable(&self, class: Class, before: u64) -> Option<u32> {
-        self.lists.front(class).filter(|&holder| self.holders[holder as usize].touched < before)
+        let is_free =
+            |&holder: &u32| holder != self.guarded && self.holders[holder as usize].touched < before;
+        self.lists.front(class).filter(is_free)
     }
 
     /// The place holder that has not been touched for longest, and not since a frame. Empty ones count as never touched.
@@ -463,7 +474,7 @@ impl Pager {
         }
         let place = match self.in_use {
             InUse::Stays => self.takeable(Class::Free, self.frame),
-            InUse::Yields => self.oldest(self.frame.saturating_sub(IDLE)),
+            InUse::Yields => self.oldest(self.frame.saturating_sub(IDLE).max(1)),
         };
         match place {
             Some(holder) => self.ask(page, holder, false),

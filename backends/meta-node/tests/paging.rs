@@ -60,6 +60,9 @@ impl Front {
             }
             done += 1;
             self.active.pop();
+            let children: Vec<NodeId> = tree.children(node).collect();
+            self.boundary.retain(|node| !children.contains(node));
+            self.boundary.push(node);
         }
         done
     }
