@@ -3,7 +3,7 @@
 use criterion::{BatchSize, Criterion, Throughput, criterion_group, criterion_main};
 use foldfront::Bounds;
 use foldfront::front::Slot;
-use foldfront::queue::{EventQueue, Kind};
+use foldfront::queue::{DUE, Event, EventQueue, Kind};
 
 const EVENTS: u32 = 100_000;
 const BOUNDS: Bounds = Bounds { center: [0.0; 3], radius: 1.0, eps: 0.0 };
@@ -35,16 +35,21 @@ fn operations(criterion: &mut Criterion) {
         );
     });
     group.bench_function("advance and reschedule, 50 frames", |b| {
-        let mut due = Vec::new();
+        let mut due = [Event::BLANK; DUE];
         b.iter_batched_ref(
             filled,
             |queue| {
                 for frame in 1..=50 {
                     let now = f64::from(frame);
-                    due.clear();
-                    queue.advance(0, now, &mut due);
-                    for event in &due {
-                        queue.schedule(0, frames_ahead(event.slot.0), *event);
+                    queue.advance(0, now);
+                    loop {
+                        let count = queue.next_due(&mut due);
+                        if count == 0 {
+                            break;
+                        }
+                        for event in &due[..count] {
+                            queue.schedule(0, frames_ahead(event.slot.0), *event);
+                        }
                     }
                 }
             },

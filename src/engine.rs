@@ -157,7 +157,6 @@ pub struct Engine<T, M> {
     still_needed: Vec<Noted>,
     folding: Vec<Noted>,
     unfolding: Vec<Noted>,
-    nodes: Vec<NodeId>,
     arrived: Vec<NodeId>,
     drawing_time: Duration,
 }
@@ -199,7 +198,6 @@ impl<T: VertexTree, M: MeshSink> Engine<T, M> {
             still_needed: Vec::new(),
             folding: Vec::new(),
             unfolding: Vec::new(),
-            nodes: Vec::new(),
             arrived: Vec::new(),
             drawing_time: Duration::ZERO,
         })
@@ -278,7 +276,7 @@ impl<T: VertexTree, M: MeshSink> Engine<T, M> {
             self.kappa = kappa;
         }
         let speed = Speed { rho: self.settings.rho, omega: self.settings.omega, kappa: self.kappa };
-        let mut motion = self.odometer.advance(&speed, &self.before, &self.views);
+        let mut motion = self.odometer.advance(&speed.into(), &self.before, &self.views);
         if redeclared {
             motion = crate::motion::Motion::Unbounded;
         }
@@ -302,7 +300,6 @@ impl<T: VertexTree, M: MeshSink> Engine<T, M> {
             still_needed: &mut self.still_needed,
             folding: &mut self.folding,
             unfolding: &mut self.unfolding,
-            nodes: &mut self.nodes,
             counts: Counts::default(),
             tests: 0,
         };
@@ -355,9 +352,11 @@ impl<T: VertexTree, M: MeshSink> Engine<T, M> {
     }
 }
 
-/// Changes whose memory is fetched together: enough to keep every channel to it busy, few enough to stay in the
-/// nearest cache.
-const PREPARED: usize = 32;
+/// Changes that are made before the next ones are prepared.
+const TOGETHER: usize = 8;
+
+/// Steps of preparation that are taken.
+const MOST_STEPS: usize = 8;
 
 /// Carries out status changes and what follows from them.
 struct Steps<'a, T, M> {
@@ -377,8 +376,6 @@ struct Steps<'a, T, M> {
     /// so that its memory is fetched with that of others too.
     folding: &'a mut Vec<Noted>,
     unfolding: &'a mut Vec<Noted>,
-    /// Room for the numbers of the nodes that are prepared together.
-    nodes: &'a mut Vec<NodeId>,
     counts: Counts,
     tests: u64,
 }
@@ -386,35 +383,15 @@ struct Steps<'a, T, M> {
 impl<T: VertexTree, M: MeshSink> Steps<'_, T, M> {
     /// Folds, then unfolds, and whatever follows.
     fn apply(&mut self) -> Result<(), TreeError> {
-        let mut done = 0;
-        while done < self.folding.len() {
-            let end = self.folding.len().min(done + PREPARED);
-            self.prepare(|steps| &steps.folding[done..end]);
-            for at in done..end {
-                self.fold(self.folding[at])?;
-            }
-            done = end;
-        }
-        let mut done = 0;
-        while done < self.unfolding.len() {
-            let end = self.unfolding.len().min(done + PREPARED);
-            self.prepare(|steps| &steps.unfolding[done..end]);
-            for at in done..end {
-                self.unfold(self.unfolding[at])?;
-            }
-            done = end;
-        }
+        self.take_turns(|steps| &mut *steps.folding, Self::fold)?;
+        self.take_turns(|steps| &mut *steps.unfolding, Self::unfold)?;
         // What was needed when its turn came may have been let go since.
         let mut before = None;
         while !self.still_needed.is_empty() && before != Some(self.counts.folds) {
             before = Some(self.counts.folds);
             self.folding.clear();
             self.folding.append(self.still_needed);
-            let mut at = 0;
-            while at < self.folding.len() {
-                self.fold(self.folding[at])?;
-                at += 1;
-            }
+            self.take_turns(|steps| &mut *steps.folding, Self::fold)?;
             let front = &*self.front;
             self.still_needed.sort_unstable();
             self.still_needed.dedup();
@@ -441,16 +418,44 @@ impl<T: VertexTree, M: MeshSink> Steps<'_, T, M> {
         }
     }
 
-    fn prepare(&mut self, noted: impl FnOnce(&Self) -> &[Noted]) {
-        let mut nodes = std::mem::take(self.nodes);
-        nodes.clear();
-        for &(slot, node) in noted(self) {
-            self.front.prefetch_linked(slot);
-            self.finder.prefetch(slot);
-            nodes.push(node);
+    /// Changes the nodes of a list, which may grow meanwhile. While some change, those whose turn comes next are prepared,
+    /// the further off the less.
+    #[inline(always)]
+    fn take_turns(
+        &mut self,
+        list: impl Fn(&mut Self) -> &mut Vec<Noted>,
+        change: impl Fn(&mut Self, Noted) -> Result<(), TreeError>,
+    ) -> Result<(), TreeError> {
+        let mut noted = std::mem::take(list(self));
+        let mut prepared = [0; MOST_STEPS];
+        let steps = T::PREPARATION.clamp(1, MOST_STEPS);
+        let mut done = 0;
+        let mut result = Ok(());
+        while done < noted.len() && result.is_ok() {
+            for (step, prepared) in prepared[..steps].iter_mut().enumerate() {
+                let end = noted.len().min(done + TOGETHER * (steps - step));
+                for &(slot, node) in &noted[*prepared..end] {
+                    match step {
+                        0 => {
+                            self.front.prefetch_linked(slot);
+                            self.finder.prefetch(slot);
+                            self.tree.prepare(node, 0, self.mesh);
+                        }
+                        _ => self.tree.prepare(node, step, self.mesh),
+                    }
+                }
+                *prepared = end;
+            }
+            let end = noted.len().min(done + TOGETHER);
+            while done < end && result.is_ok() {
+                result = change(self, noted[done]);
+                done += 1;
+            }
+            // What follows from these changes.
+            noted.append(list(self));
         }
-        self.tree.prepare(&nodes, self.mesh);
-        *self.nodes = nodes;
+        *list(self) = noted;
+        result
     }
 
     fn wanted(&mut self, slot: Slot) -> bool {
@@ -610,7 +615,7 @@ impl<T: VertexTree, M: MeshSink> Steps<'_, T, M> {
 /// Looks up the nodes in some slots, before anything changes.
 fn note(front: &Front, slots: &[Slot], noted: &mut Vec<Noted>) {
     noted.clear();
-    for slots in slots.chunks(PREPARED) {
+    for slots in slots.chunks(32) {
         slots.iter().for_each(|&slot| front.prefetch(slot));
         noted.extend(slots.iter().map(|&slot| (slot, front.node(slot))));
     }

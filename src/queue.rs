@@ -61,7 +61,8 @@ pub struct Event {
 }
 
 impl Event {
-    const BLANK: Self = Self {
+    /// Stands where there is no event.
+    pub const BLANK: Self = Self {
         bounds: Bounds { center: [0.0; 3], radius: 0.0, eps: 0.0 },
         slot: Slot::NONE,
         tag: 0,
@@ -73,6 +74,11 @@ impl Event {
     #[must_use]
     pub fn kind(&self) -> Kind {
         if self.tag & 1 == 0 { Kind::Unfold } else { Kind::Fold }
+    }
+
+    #[inline(always)]
+    pub(crate) fn tag(&self) -> u32 {
+        self.tag
     }
 
     #[inline(always)]
@@ -112,8 +118,12 @@ impl Pool {
         if bucket.is_multiple_of(CHUNK) {
             self.open(bucket);
         }
-        self.chunks[(*bucket / CHUNK) as usize][(*bucket % CHUNK) as usize] = event;
+        let (chunk, place) = ((*bucket / CHUNK) as usize, (*bucket % CHUNK) as usize);
+        self.chunks[chunk][place] = event;
         *bucket += 1;
+        // Where the bucket's next event but one goes: stores leave the processor in order, and one that misses the
+        // nearest cache holds up all others.
+        prefetch(self.chunks.as_flattened(), *bucket as usize + 1);
     }
 
     /// Adds an empty chunk to a bucket.
@@ -125,32 +135,54 @@ impl Pool {
             self.previous.push(0);
             self.chunks.len() as u32 - 1
         });
+        if let Some(&next) = self.free.last() {
+            prefetch(&self.chunks, next as usize);
+        }
         self.previous[chunk as usize] = previous;
         *bucket = chunk * CHUNK;
     }
 
-    /// Moves the events of a bucket for which `keep` says so to `due`, and empties it. Returns how many there were.
+    /// Takes events off the end of a bucket that is not empty, no more than there is room for in `due` after the first
+    /// `count`, and none but those that `keep` says to keep. Returns how many there are in `due` then, and how many
+    /// were taken off.
     #[inline(always)]
-    fn take(&mut self, bucket: &mut Bucket, due: &mut Vec<Event>, keep: impl Fn(&Event) -> bool) -> usize {
-        let mut count = 0;
-        let mut end = std::mem::take(bucket);
-        while end != 0 {
-            let chunk = (end - 1) / CHUNK;
-            let previous = self.previous[chunk as usize];
-            prefetch(&self.chunks, previous as usize);
-            let events = &self.chunks[chunk as usize][..(end - chunk * CHUNK) as usize];
-            count += events.len();
-            for event in events {
-                if keep(event) {
-                    due.push(*event);
-                }
-            }
-            self.free.push(chunk);
-            end = if previous == 0 { 0 } else { (previous + 1) * CHUNK };
+    fn take(
+        &mut self,
+        bucket: &mut Bucket,
+        due: &mut [Event; DUE],
+        mut count: usize,
+        keep: impl Fn(&Event) -> bool,
+    ) -> (usize, usize) {
+        let chunk = (*bucket - 1) / CHUNK;
+        let start = chunk * CHUNK;
+        let used = (*bucket - start) as usize;
+        let taken = used.min(DUE - count);
+        for event in &self.chunks[chunk as usize][used - taken..used] {
+            due[count % DUE] = *event;
+            count += usize::from(keep(event));
         }
-        count
+        *bucket -= taken as u32;
+        if *bucket == start {
+            self.free.push(chunk);
+            let previous = self.previous[chunk as usize];
+            *bucket = if previous == 0 { 0 } else { (previous + 1) * CHUNK };
+            if previous != 0 {
+                self.prefetch_chunk(previous);
+            }
+        }
+        (count, taken)
+    }
+
+    #[inline(always)]
+    fn prefetch_chunk(&self, chunk: u32) {
+        for event in (0..CHUNK).step_by(2) {
+            prefetch(self.chunks.as_flattened(), (chunk * CHUNK + event) as usize);
+        }
     }
 }
+
+/// Most events that come up at a time: as many as vector code tests together.
+pub const DUE: usize = crate::packed::LANES;
 
 /// Buckets of events on one clock.
 #[derive(Debug)]
@@ -174,15 +206,18 @@ impl Wheel {
         let ahead = ahead.min(HORIZON);
         let deadline = self.tick + u64::from(ahead);
         // On level l, `ahead` spans (ahead >> l) slots, and one more where it straddles their borders: at most 15.
-        let mut level = (32 - ahead.leading_zeros() as usize).saturating_sub(4);
-        level += usize::from((deadline >> level) - (self.tick >> level) >= SLOTS);
-        let slot = (deadline >> level) % SLOTS;
+        let level = (32 - ahead.leading_zeros()).saturating_sub(4);
+        let straddles = (deadline >> level) - (self.tick >> level) >= SLOTS;
+        let level = level + u32::from(straddles);
+        let slot = (deadline >> level) as u32 % SLOTS as u32;
+        // Never more than there are, which spares a panic.
+        let level = level as usize % LEVELS;
         self.occupied[level] |= 1 << slot;
         pool.push(&mut self.levels[level][slot as usize], event);
     }
 
-    /// Calls `take` with each bucket that the clock reaches on its way to `now`.
-    fn advance(&mut self, now: f64, take: &mut dyn FnMut(&mut Bucket)) {
+    /// Moves each bucket that the clock reaches on its way to `now` to `ripe`.
+    fn advance(&mut self, now: f64, ripe: &mut Vec<Bucket>) {
         let before = self.tick;
         let after = (now * TICKS_PER_FRAME) as u64;
         debug_assert!(after >= before, "the clock went back from tick {before} to {after}");
@@ -195,30 +230,65 @@ impl Wheel {
                 // Wider levels have not moved either.
                 break;
             }
-            if self.occupied[level] == 0 {
-                continue;
-            }
-            for slot in first..=last.min(first + SLOTS - 1) {
-                self.take(level, (slot % SLOTS) as usize, take);
-            }
+            // The slots from `first` to `last`, round the ring.
+            let count = (last - first + 1).min(SLOTS);
+            let reached = (((1_u32 << count) - 1) as u16).rotate_left((first % SLOTS) as u32);
+            self.take(level, reached, ripe);
         }
     }
 
-    fn take(&mut self, level: usize, slot: usize, take: &mut dyn FnMut(&mut Bucket)) {
-        if self.occupied[level] >> slot & 1 == 1 {
-            self.occupied[level] &= !(1 << slot);
-            take(&mut self.levels[level][slot]);
+    fn take_all(&mut self, ripe: &mut Vec<Bucket>) {
+        for level in 0..LEVELS {
+            self.take(level, u16::MAX, ripe);
+        }
+    }
+
+    /// Moves the buckets in some slots of a level, one bit each.
+    fn take(&mut self, level: usize, slots: u16, ripe: &mut Vec<Bucket>) {
+        let mut slots = slots & self.occupied[level];
+        self.occupied[level] &= !slots;
+        while slots != 0 {
+            let bucket = std::mem::take(&mut self.levels[level][slots.trailing_zeros() as usize]);
+            // Nothing may be left in it but its bit.
+            if bucket != 0 {
+                ripe.push(bucket);
+            }
+            slots &= slots - 1;
         }
     }
 }
 
-/// The queue. Times are frames at full speed on an [`Odometer`](crate::motion::Odometer), one for each clock.
+/// One clock of a queue.
+pub(crate) struct OnClock<'a> {
+    wheel: &'a mut Wheel,
+    pool: &'a mut Pool,
+    stored: &'a mut usize,
+}
+
+impl OnClock<'_> {
+    #[inline(always)]
+    pub fn schedule(&mut self, frames: f64, event: Event) {
+        // Rounded down, as the clock's time is to its tick; `as` saturates.
+        self.schedule_ticks((frames * TICKS_PER_FRAME) as u32, event);
+    }
+
+    /// Schedules an event that must not come up more than so many ticks after the one that the clock is in.
+    #[inline(always)]
+    pub fn schedule_ticks(&mut self, ticks: u32, event: Event) {
+        *self.stored += 1;
+        self.wheel.push(self.pool, ticks, event);
+    }
+}
+
+/// The queue. Times are frames on an [`Odometer`](crate::motion::Odometer), one for each clock.
 #[derive(Debug)]
 pub struct EventQueue {
     wheels: Vec<Wheel>,
     pool: Pool,
     /// Events to return at every advance.
     pressing: Bucket,
+    /// Buckets whose time has come, none of them empty.
+    ripe: Vec<Bucket>,
     /// Kept between sweeps for its allocation.
     swept: Vec<Event>,
     tickets: Vec<u16>,
@@ -236,6 +306,7 @@ impl EventQueue {
             wheels: (0..clocks).map(|_| Wheel::new()).collect(),
             pool: Pool::new(),
             pressing: 0,
+            ripe: Vec::new(),
             swept: Vec::new(),
             tickets: Vec::new(),
             stored: 0,
@@ -276,17 +347,14 @@ impl EventQueue {
     /// Schedules an event that must not come up later than `frames` after the clock's time at the last
     /// [`advance`](Self::advance). Does not touch the node, so that an event that has come up and led to nothing can be
     /// scheduled again in passing.
-    #[inline(always)]
     pub fn schedule(&mut self, clock: usize, frames: f64, event: Event) {
-        // Rounded down, as the clock's time is to its tick; `as` saturates.
-        self.schedule_ticks(clock, (frames * TICKS_PER_FRAME) as u32, event);
+        self.on(clock).schedule(frames, event);
     }
 
-    /// Schedules an event that must not come up more than so many ticks after the one that the clock is in.
+    /// For scheduling many events on one clock.
     #[inline(always)]
-    pub fn schedule_ticks(&mut self, clock: usize, ticks: u32, event: Event) {
-        self.stored += 1;
-        self.wheels[clock].push(&mut self.pool, ticks, event);
+    pub(crate) fn on(&mut self, clock: usize) -> OnClock<'_> {
+        OnClock { wheel: &mut self.wheels[clock], pool: &mut self.pool, stored: &mut self.stored }
     }
 
     /// Schedules an event for the next advance of any clock and every advance after it, moved or not, until it is
@@ -312,15 +380,21 @@ impl EventQueue {
 
     #[cold]
     fn sweep(&mut self) {
-        let Self { wheels, pool, pressing, swept, tickets, .. } = self;
+        let Self { wheels, pool, pressing, ripe, swept, tickets, .. } = self;
         self.stored = 0;
         let buckets = wheels.iter_mut().flat_map(|wheel| wheel.levels.as_flattened_mut());
-        for bucket in buckets.chain([pressing]) {
+        let mut due = [Event::BLANK; DUE];
+        for bucket in buckets.chain(ripe).chain([pressing]) {
             swept.clear();
-            pool.take(bucket, swept, |event| tickets[event.slot.index()] == event.ticket());
+            while *bucket != 0 {
+                let is_valid = |event: &Event| tickets[event.slot.index()] == event.ticket();
+                let (count, _) = pool.take(bucket, &mut due, 0, is_valid);
+                swept.extend_from_slice(&due[..count]);
+            }
             swept.iter().for_each(|&event| pool.push(bucket, event));
             self.stored += swept.len();
         }
+        self.ripe.retain(|&bucket| bucket != 0);
         self.cancelled = 0;
     }
 
@@ -329,52 +403,60 @@ impl EventQueue {
         prefetch(&self.tickets, slot.index());
     }
 
-    /// Appends the pressing events to `due`, removing them.
-    pub fn take_pressing(&mut self, due: &mut Vec<Event>) {
-        let mut pressing = std::mem::take(&mut self.pressing);
-        self.with_wheels(due, |_, take| take(&mut pressing));
+    /// Lets the pressing events come up.
+    pub fn take_pressing(&mut self) {
+        let pressing = std::mem::take(&mut self.pressing);
+        if pressing != 0 {
+            self.ripe.push(pressing);
+        }
     }
 
-    /// Moves a clock to `now` and appends to `due` every event on it that must be tested by then, removing it, and
-    /// whatever is pressing.
-    pub fn advance(&mut self, clock: usize, now: f64, due: &mut Vec<Event>) {
-        self.take_pressing(due);
-        self.with_wheels(due, |wheels, take| wheels[clock].advance(now, take));
+    /// Moves a clock to `now`, and lets every event on it come up that must be tested by then, and whatever is pressing.
+    pub fn advance(&mut self, clock: usize, now: f64) {
+        self.take_pressing();
+        self.wheels[clock].advance(now, &mut self.ripe);
     }
 
-    /// Appends every event on one clock to `due`, removing it: for a motion that its speeds do not cover.
-    pub fn take_clock(&mut self, clock: usize, due: &mut Vec<Event>) {
-        self.with_wheels(due, |wheels, take| {
-            for level in 0..LEVELS {
-                for slot in 0..SLOTS as usize {
-                    wheels[clock].take(level, slot, take);
+    /// Whether no event waits on a clock.
+    #[must_use]
+    pub fn is_idle(&self, clock: usize) -> bool {
+        self.wheels[clock].occupied == [0; LEVELS]
+    }
+
+    /// Lets every event on one clock come up: for a motion that its speeds do not cover.
+    pub fn take_clock(&mut self, clock: usize) {
+        self.wheels[clock].take_all(&mut self.ripe);
+    }
+
+    /// Lets every event come up: for a motion that no declared speed covers.
+    pub fn take_all(&mut self) {
+        self.take_pressing();
+        for clock in 0..self.wheels.len() {
+            self.take_clock(clock);
+        }
+    }
+
+    /// Removes some of the events that have come up and returns how many; 0 when there are no more. They are the first
+    /// ones in `due`. Those that are scheduled meanwhile do not come up before their clock advances again.
+    #[inline(always)]
+    pub fn next_due(&mut self, due: &mut [Event; DUE]) -> usize {
+        let Self { ripe, pool, tickets, stored, cancelled, .. } = self;
+        let mut count = 0;
+        while count < DUE
+            && let Some(bucket) = ripe.last_mut()
+        {
+            let is_valid = |event: &Event| tickets[event.slot.index()] == event.ticket();
+            let (now, taken) = pool.take(bucket, due, count, is_valid);
+            *stored -= taken;
+            *cancelled = cancelled.saturating_sub(taken - (now - count));
+            count = now;
+            if *bucket == 0 {
+                ripe.pop();
+                if let Some(&next) = ripe.last() {
+                    pool.prefetch_chunk((next - 1) / CHUNK);
                 }
             }
-        });
-    }
-
-    /// Appends every event to `due`, removing it: for a motion that no declared speed covers.
-    pub fn take_all(&mut self, due: &mut Vec<Event>) {
-        self.take_pressing(due);
-        for clock in 0..self.wheels.len() {
-            self.take_clock(clock, due);
         }
-        self.cancelled = 0;
-    }
-
-    /// Calls `f` with the wheels and with what moves the valid events of a bucket to `due`.
-    #[inline(always)]
-    fn with_wheels(
-        &mut self,
-        due: &mut Vec<Event>,
-        f: impl FnOnce(&mut [Wheel], &mut dyn FnMut(&mut Bucket)),
-    ) {
-        let Self { wheels, pool, tickets, stored, cancelled, .. } = self;
-        f(wheels, &mut |bucket| {
-            let before = due.len();
-            let taken = pool.take(bucket, due, |event| tickets[event.slot.index()] == event.ticket());
-            *stored -= taken;
-            *cancelled = cancelled.saturating_sub(taken - (due.len() - before));
-        });
+        count
     }
 }

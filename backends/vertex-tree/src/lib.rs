@@ -15,6 +15,7 @@
 //! Leaves of the forest are the input vertices. They can not be unfolded and have no [`NodeId`].
 
 mod bounds;
+mod leaf_map;
 mod leaf_set;
 mod log;
 mod log_file;
