@@ -153,7 +153,8 @@ pub struct Engine<T, M> {
     flips: Flips,
     stack: Vec<Pending>,
     missing: Vec<NodeId>,
-    blocked: Vec<NodeId>,
+    blocked: Vec<Noted>,
+    forbidden: Vec<NodeId>,
     still_needed: Vec<Noted>,
     folding: Vec<Noted>,
     unfolding: Vec<Noted>,
@@ -195,6 +196,7 @@ impl<T: VertexTree, M: MeshSink> Engine<T, M> {
             stack: Vec::new(),
             missing: Vec::new(),
             blocked: Vec::new(),
+            forbidden: Vec::new(),
             still_needed: Vec::new(),
             folding: Vec::new(),
             unfolding: Vec::new(),
@@ -297,6 +299,7 @@ impl<T: VertexTree, M: MeshSink> Engine<T, M> {
             stack: &mut self.stack,
             missing: &mut self.missing,
             blocked: &mut self.blocked,
+            forbidden: &mut self.forbidden,
             still_needed: &mut self.still_needed,
             folding: &mut self.folding,
             unfolding: &mut self.unfolding,
@@ -305,6 +308,7 @@ impl<T: VertexTree, M: MeshSink> Engine<T, M> {
         };
         step.missing.clear();
         step.blocked.clear();
+        step.forbidden.clear();
         note(step.front, &self.flips.fold, step.folding);
         note(step.front, &self.flips.unfold, step.unfolding);
         let applied = step.apply();
@@ -317,7 +321,7 @@ impl<T: VertexTree, M: MeshSink> Engine<T, M> {
             nodes.dedup();
             nodes.len() as u64
         };
-        let (misses, blocked) = (distinct(&mut self.missing), distinct(&mut self.blocked));
+        let (misses, blocked) = (distinct(&mut self.missing), distinct(&mut self.forbidden));
         let apply = found.elapsed();
         self.finder.settle(&frame);
         applied?;
@@ -369,7 +373,9 @@ struct Steps<'a, T, M> {
     /// Nodes whose change was refused for want of a page; some more than once.
     missing: &'a mut Vec<NodeId>,
     /// Nodes whose change a rule of the backend's own forbade; some more than once.
-    blocked: &'a mut Vec<NodeId>,
+    forbidden: &'a mut Vec<NodeId>,
+    /// The same while others may yet make them possible.
+    blocked: &'a mut Vec<Noted>,
     /// Nodes that no view wants and that something else still needs.
     still_needed: &'a mut Vec<Noted>,
     /// Collapsible nodes to fold and boundary nodes to unfold, in this order. What follows from a change goes to the end,
@@ -384,7 +390,25 @@ impl<T: VertexTree, M: MeshSink> Steps<'_, T, M> {
     /// Folds, then unfolds, and whatever follows.
     fn apply(&mut self) -> Result<(), TreeError> {
         self.take_turns(|steps| &mut *steps.folding, Self::fold)?;
+        // What a rule forbade when its turn came may have become possible since: to a fixpoint, so that the order in which
+        // a strategy finds changes does not matter.
+        let mut before = None;
+        while !self.blocked.is_empty() && before != Some(self.counts.folds) {
+            before = Some(self.counts.folds);
+            self.folding.clear();
+            self.folding.append(self.blocked);
+            self.take_turns(|steps| &mut *steps.folding, Self::fold)?;
+        }
+        self.forbidden.extend(self.blocked.drain(..).map(|(_, node)| node));
         self.take_turns(|steps| &mut *steps.unfolding, Self::unfold)?;
+        let mut before = None;
+        while !self.blocked.is_empty() && before != Some(self.counts.unfolds) {
+            before = Some(self.counts.unfolds);
+            self.unfolding.clear();
+            self.unfolding.append(self.blocked);
+            self.take_turns(|steps| &mut *steps.unfolding, Self::unfold)?;
+        }
+        self.forbidden.extend(self.blocked.drain(..).map(|(_, node)| node));
         // What was needed when its turn came may have been let go since.
         let mut before = None;
         while !self.still_needed.is_empty() && before != Some(self.counts.folds) {
@@ -485,7 +509,7 @@ impl<T: VertexTree, M: MeshSink> Steps<'_, T, M> {
                 return Ok(());
             }
             Step::Blocked => {
-                self.blocked.push(node);
+                self.blocked.push((slot, node));
                 self.refused(slot, Kind::Fold);
                 return Ok(());
             }
@@ -548,7 +572,7 @@ impl<T: VertexTree, M: MeshSink> Steps<'_, T, M> {
                     continue;
                 }
                 Step::Blocked => {
-                    self.blocked.push(node);
+                    self.blocked.push((slot, node));
                     self.give_up();
                     continue;
                 }

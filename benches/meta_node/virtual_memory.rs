@@ -129,7 +129,13 @@ fn sort(log: &CollapseLog, nodes: &mut [Node], vertex: &[u32]) -> (Vec<[u32; 3]>
         };
         if a != b && b != c {
             let (ab, bc) = (meet(a, b), meet(b, c));
-            all.push((if span(ab) <= span(bc) { ab } else { bc }, leaves));
+            let bringer = if span(ab) <= span(bc) { ab } else { bc };
+            let mut leaves = leaves;
+            if let Some(&Node { first, end, .. }) = nodes.get(bringer as usize) {
+                // The corner that is not below the node comes first.
+                leaves.rotate_left(leaves.iter().position(|leaf| !(first..end).contains(leaf)).unwrap_or(0));
+            }
+            all.push((bringer, leaves));
         }
     }
     all.sort_by_key(|&(bringer, _)| bringer);
@@ -152,6 +158,7 @@ pub struct MappedTree {
     base: Vec<u32>,
     mesh: Option<StarMesh>,
     displayed: u64,
+    scratch: Vec<LeafTriangle>,
 }
 
 const HEADER: usize = 64;
@@ -169,6 +176,7 @@ impl MappedTree {
             base: Vec::new(),
             mesh: None,
             displayed: 0,
+            scratch: Vec::new(),
         };
         let [nodes, leaves, triangles, _, roots, base] = counts;
         let at = HEADER + 64 * nodes + 12 * leaves + 12 * triangles;
@@ -244,7 +252,7 @@ impl VertexTree for MappedTree {
             for &leaf in &self.base {
                 stars.add_vertex(leaf, self.places()[leaf as usize], mesh);
             }
-            base.iter().for_each(|&leaves| stars.add_triangle(LeafTriangle { leaves, number: 0 }, mesh));
+            base.iter().for_each(|&leaves| stars.add_triangle(LeafTriangle::new(leaves, 0, 0), mesh));
             self.mesh = Some(stars);
         }
         Ok(())
@@ -254,8 +262,11 @@ impl VertexTree for MappedTree {
         self.displayed += brought.len() as u64;
         if let Some(mut stars) = self.mesh.take() {
             let Node { first, pivot, .. } = self.nodes()[node.index()];
-            let brought = self.corners()[brought].iter().map(|&leaves| LeafTriangle { leaves, number: 0 });
-            stars.split([first, pivot], self.places()[pivot as usize], brought, mesh);
+            let mut scratch = std::mem::take(&mut self.scratch);
+            scratch.clear();
+            scratch.extend(self.corners()[brought].iter().map(|&leaves| LeafTriangle::new(leaves, 0, 0)));
+            stars.split([first, pivot], self.places()[pivot as usize], &scratch, mesh);
+            self.scratch = scratch;
             self.mesh = Some(stars);
         }
         Ok(Step::Done)

@@ -49,6 +49,17 @@ struct Shown {
 
 const NOTHING: Shown = Shown { node: NodeId(NONE), number: 0, parent: u32::MAX };
 
+/// A node that is active or on the boundary.
+#[derive(Clone, Copy, Debug)]
+struct InPlay {
+    /// The node above; [`NONE`] for a root.
+    above: NodeId,
+    /// Its number in the log.
+    collapse: u32,
+    /// Where its vertex is shown.
+    leaf: u32,
+}
+
 /// One of the two vertices of a split: its node and that node's number in the log, or nothing for a leaf.
 pub(crate) type Half = Option<(NodeId, u32)>;
 
@@ -59,8 +70,8 @@ pub(crate) struct Rules {
     /// Vertices of the input.
     leaves: u32,
     shown: Vec<Shown>,
-    /// For each node in play, the one above, [`NONE`] for a root: what is needed may be on a page that has gone.
-    above: FxHashMap<NodeId, NodeId>,
+    /// The nodes in play: what is needed, or what needs it, may be on a page that is not there.
+    in_play: FxHashMap<NodeId, InPlay>,
 }
 
 impl Rules {
@@ -70,7 +81,7 @@ impl Rules {
             forces,
             leaves,
             shown: Vec::new(),
-            above: FxHashMap::default(),
+            in_play: FxHashMap::default(),
         })
     }
 
@@ -78,23 +89,24 @@ impl Rules {
         self.leaves.saturating_add(collapse)
     }
 
-    /// A node comes into play below another.
-    pub fn enter(&mut self, half: Half, above: Option<NodeId>) {
-        if let Some((node, _)) = half {
-            self.above.insert(node, above.unwrap_or(NodeId(NONE)));
+    /// A node, whose vertex is shown at `leaf`, comes into play below another, or as a root.
+    pub fn enter(&mut self, half: Half, leaf: u32, above: Option<NodeId>) {
+        if let Some((node, collapse)) = half {
+            let above = above.unwrap_or(NodeId(NONE));
+            self.in_play.insert(node, InPlay { above, collapse, leaf });
         }
     }
 
     /// A node goes out of play.
     pub fn leave(&mut self, half: Half) {
         if let Some((node, _)) = half {
-            self.above.remove(&node);
+            self.in_play.remove(&node);
         }
     }
 
     /// The node above one that is in play; a number that is none for a root.
     pub fn above(&self, node: NodeId) -> Option<NodeId> {
-        self.above.get(&node).copied()
+        self.in_play.get(&node).map(|node| node.above)
     }
 
     /// What is shown in a slot changes. `parent` is a number in the log, if there is a parent.
@@ -110,8 +122,10 @@ impl Rules {
         };
     }
 
-    /// Whether a node, whose vertex is shown at `leaf`, may split.
-    pub fn may_split(&self, collapse: u32, leaf: u32, mesh: &StarMesh) -> Option<Step> {
+    /// What keeps a boundary node from splitting, if anything does. It is known without the node's page: a chain of nodes
+    /// that need each other unfolds with a page at a time.
+    pub fn may_split(&self, node: NodeId, mesh: &StarMesh) -> Option<Step> {
+        let &InPlay { collapse, leaf, .. } = self.in_play.get(&node)?;
         let around = mesh.neighbours(mesh.vertex(leaf)).map(|vertex| self.shown[vertex as usize]);
         let largest = around.max_by_key(|shown| shown.number)?;
         if largest.number < self.number(collapse) {
@@ -120,7 +134,7 @@ impl Rules {
         Some(if self.forces { Step::Needs(largest.node) } else { Step::Blocked })
     }
 
-    /// Whether a node, whose children are shown at two leaves, may be collapsed.
+    /// What keeps a node, whose children are shown at two leaves, from being collapsed, if anything does.
     pub fn may_merge(&self, collapse: u32, leaves: [u32; 2], mesh: &StarMesh) -> Option<Step> {
         let halves = leaves.map(|leaf| mesh.vertex(leaf));
         let around = halves.into_iter().flat_map(|half| mesh.neighbours(half));

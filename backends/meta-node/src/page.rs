@@ -17,7 +17,8 @@
 //!         2 B   blocks: number of the node above the topmost one, and that node's number in the log; both
 //!               2^32 - 1 for a root
 //!         7 K   links: number of the node, its number in the log, centre, radius, error
-//!         3 T   the local triangle list: three leaves each, in the order of the nodes that bring them
+//!         3 T   the local triangle list: three leaves each, in the order of the nodes that bring them; first the one that
+//!               is not below the node, then the others in their sense of rotation
 //! ```
 //!
 //! A node:

@@ -41,6 +41,8 @@ pub struct MetaNodeTree {
     mesh: Option<StarMesh>,
     rules: Option<Rules>,
     displayed: u64,
+    /// Room for the triangles that come with a split.
+    brought: Vec<LeafTriangle>,
     /// Nodes whose page was missing and has not come yet.
     refused: FxHashSet<NodeId>,
 }
@@ -60,6 +62,7 @@ impl MetaNodeTree {
             mesh: None,
             rules: Rules::new(settings.dependencies, leaves),
             displayed: 0,
+            brought: Vec::new(),
             refused: FxHashSet::default(),
         };
         for root in 0..tree.roots.len() {
@@ -175,6 +178,7 @@ impl MetaNodeTree {
 
 impl VertexTree for MetaNodeTree {
     const IS_TREE: bool = true;
+    const PREPARATION: usize = 3 + StarMesh::PREPARATION;
 
     fn node_limit(&self) -> u32 {
         self.pager.file.header.pages << self.slot_bits
@@ -257,17 +261,22 @@ impl VertexTree for MetaNodeTree {
             let half = roots.next().map(|root| (root.node, root.log_number));
             if let Some(rules) = &mut self.rules {
                 rules.show(vertex, leaf, half, None);
-                rules.enter(half, None);
+                rules.enter(half, leaf, None);
             }
         }
         for &leaves in &file.base_triangles {
-            stars.add_triangle(LeafTriangle { leaves, number: 0 }, mesh);
+            stars.add_triangle(LeafTriangle::new(leaves, 0, 0), mesh);
         }
         self.mesh = Some(stars);
         Ok(())
     }
 
     fn unfold<M: MeshSink>(&mut self, node: NodeId, mesh: &mut M) -> Result<Step, TreeError> {
+        if let (Some(rules), Some(stars)) = (&self.rules, &self.mesh)
+            && let Some(step) = rules.may_split(node, stars)
+        {
+            return Ok(step);
+        }
         let Some(holder) = self.find(node, Switch::Down) else { return Ok(Step::NotResident) };
         let (own, slot) = self.place(node);
         let page = self.pager.page(holder);
@@ -278,19 +287,15 @@ impl VertexTree for MetaNodeTree {
         let (children, leaves) = (of.children(), of.leaves());
         let (start, end) = page.brought_range(slot);
         if let Some(stars) = &mut self.mesh {
-            if let Some(rules) = &self.rules
-                && let Some(step) = rules.may_split(of.log_number(), leaves[0], stars)
-            {
-                return Ok(step);
-            }
-            let brought = page.brought(slot).map(|leaves| LeafTriangle { leaves, number: 0 });
-            stars.split(leaves, of.position(), brought, mesh);
+            self.brought.clear();
+            self.brought.extend(page.brought(slot).map(|leaves| LeafTriangle::new(leaves, 0, 0)));
+            stars.split(leaves, of.position(), &self.brought, mesh);
         }
         self.displayed += u64::from(end - start);
         if let (Some(rules), Some(stars)) = (&mut self.rules, &self.mesh) {
             for (leaf, half) in leaves.into_iter().zip(halves(node.0 - slot, page, of)) {
                 rules.show(stars.vertex(leaf), leaf, half, Some(of.log_number()));
-                rules.enter(half, Some(node));
+                rules.enter(half, leaf, Some(node));
             }
         }
         self.pager.touch(holder);
@@ -331,36 +336,29 @@ impl VertexTree for MetaNodeTree {
         Ok(Step::Done)
     }
 
-    fn prepare<M: MeshSink>(&self, nodes: &[NodeId], mesh: &M) {
-        // One step of the chain of references for all nodes before the next for any.
-        nodes.iter().for_each(|&node| self.pager.prefetch_table(self.place(node).0));
-        let found = |&node: &NodeId| {
-            let (page, slot) = self.place(node);
-            self.pager.find(page).map(|holder| (holder, slot))
-        };
-        for (holder, _) in nodes.iter().filter_map(found) {
-            self.pager.prefetch_holder(holder);
+    #[inline(always)]
+    fn prepare<M: MeshSink>(&self, node: NodeId, step: usize, mesh: &M) {
+        let (page, slot) = self.place(node);
+        if step == 0 {
+            self.pager.prefetch_table(page);
+            return;
         }
-        for (holder, slot) in nodes.iter().filter_map(found) {
-            self.pager.page(holder).prefetch(slot);
-        }
-        for (holder, slot) in nodes.iter().filter_map(found) {
-            self.pager.page(holder).prefetch_children(slot);
-        }
-        let Some(stars) = &self.mesh else { return };
-        let leaves = |node: &NodeId| {
-            let (holder, slot) = found(node)?;
-            let page = self.pager.page(holder);
-            (slot < page.layout.nodes).then(|| page.node(slot).leaves())
-        };
-        for leaf in nodes.iter().filter_map(leaves).flatten() {
-            stars.prefetch_vertex(leaf);
-        }
-        for leaf in nodes.iter().filter_map(leaves).flatten() {
-            stars.prefetch_star(leaf);
-        }
-        for leaf in nodes.iter().filter_map(leaves).flatten() {
-            stars.prefetch_triangles(leaf, mesh);
+        let Some(holder) = self.pager.find(page) else { return };
+        match step {
+            1 => self.pager.prefetch_holder(holder),
+            2 => self.pager.page(holder).prefetch(slot),
+            _ => {
+                let page = self.pager.page(holder);
+                if step == 3 {
+                    page.prefetch_children(slot);
+                }
+                if let Some(stars) = &self.mesh
+                    && slot < page.layout.nodes
+                {
+                    // The triangles that come with a split follow each other in few cache lines.
+                    stars.prepare(page.node(slot).leaves(), &[], step - 3, mesh);
+                }
+            }
         }
     }
 

@@ -173,7 +173,7 @@ impl Verifier<'_> {
                     leaf if (pivot..end).contains(&leaf) => 1,
                     _ => 2,
                 });
-                if !(sides.contains(&0) && sides.contains(&1)) {
+                if !matches!(sides, [2, 0, 1] | [2, 1, 0]) {
                     return Err(damaged("a triangle is not brought by its node"));
                 }
             }

@@ -6,7 +6,7 @@ use std::path::Path;
 
 use vertex_tree::{CollapseLog, NONE, output};
 
-use crate::arrange::Arrangement;
+use crate::arrange::{Arrangement, Span};
 use crate::blocking::{self, Blocking};
 use crate::error::MetaNodeError;
 use crate::format::{HEADER_BYTES, Header};
@@ -198,7 +198,13 @@ impl Writer<'_> {
             words.extend(page::bounds_words(&arrangement.log.collapses[link as usize].bounds));
         }
         for &n in &nodes {
-            words.extend(arrangement.brought(n).iter().flatten());
+            let Span { first, end, .. } = arrangement.spans[n as usize];
+            for &(mut corners) in arrangement.brought(n) {
+                // Two corners are below the node, one on each side; the other comes first.
+                let far = corners.iter().position(|leaf| !(first..end).contains(leaf)).unwrap_or(0);
+                corners.rotate_left(far);
+                words.extend(corners);
+            }
         }
         words[1..page::HEADER_WORDS].copy_from_slice(&[
             page,

@@ -113,7 +113,7 @@ impl StarMesh {
     /// The slot of a leaf that is shown; [`NONE`] if it is not.
     #[must_use]
     pub fn vertex(&self, leaf: u32) -> VertexId {
-        self.vertex_of_leaf[leaf as usize]
+        self.vertex_of_leaf.get(leaf)
     }
 
     /// The vertices that share a displayed triangle with one, those across an inner edge twice.
