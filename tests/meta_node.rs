@@ -8,7 +8,6 @@ use std::time::Duration;
 use common::backends::{meta_node_bytes, meta_node_file};
 use common::sink::StrictMesh;
 use common::{Random, bumpy_grid, data, random_log, random_step, random_view};
-use foldfront::active_mesh::ActiveMesh;
 use foldfront::cut::Displayed;
 use foldfront::engine::{Engine, FrameReport, Settings};
 use foldfront::oracle::Oracle;
@@ -174,9 +173,11 @@ fn places(mesh: &StrictMesh) -> Vec<[[u32; 3]; 3]> {
 fn the_displayed_mesh_is_that_of_the_in_memory_tree() {
     let log = grid(50);
     let file = meta_node_file(&log, &PAGES);
-    let page_memory = 12 * holder_bytes(&file);
     let hierarchy = Arc::new(Hierarchy::new(&log).unwrap());
-    for dependencies in [Dependencies::Off, Dependencies::Force] {
+    for (dependencies, holders) in
+        [(Dependencies::Off, 4), (Dependencies::Off, 12), (Dependencies::Force, 1_000_000)]
+    {
+        let page_memory = holders * holder_bytes(&file);
         let paging = meta_node::Settings { page_memory, dependencies, ..meta_node::Settings::default() };
         let tree = MetaNodeTree::new(file.clone(), paging).unwrap();
         let mut engine = Engine::new(tree, StrictMesh::default(), settings(Strategy::Event)).unwrap();

@@ -20,6 +20,10 @@
 //! round, if every parent of a vertex in `N(p)` is split, no neighbour of `p` is greater. Thus forcing ends in the closure
 //! of what is wanted under "`p` needs the parents of `N(p)`", whatever the order; and since what is needed has a
 //! larger number, it ends. A collapse that the second rule forbids is still needed by a neighbour that is finer.
+//!
+//! One thing is open. Where a chain of needed nodes is broken off for want of a page, those at its end that have been
+//! unfolded are needed by nothing that is active yet, and fold in the next frame. With place holders for a few pages only,
+//! chains that are longer than what fits may then never be completed; with memory for what the front touches they are.
 
 use rustc_hash::FxHashMap;
 use vertex_tree::{NONE, NodeId, StarMesh, Step, VertexId};
