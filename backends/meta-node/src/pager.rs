@@ -27,6 +27,9 @@
 //! A node can unfold before the page of its children is there, since links carry their spheres; so what is asked for is
 //! not only what the front has come to, but also the pages to which the next levels below it lead.
 
+mod counts;
+mod requests;
+
 use std::collections::VecDeque;
 use std::sync::Arc;
 
@@ -37,7 +40,7 @@ use crate::board::{Board, Command, Done};
 use crate::error::MetaNodeError;
 use crate::file::MetaNodeFile;
 use crate::lists::{Class, Lists};
-use crate::page::{Child, Layout, Page};
+use crate::page::{Layout, Page};
 
 /// The least number of place holders: one in use and three that are not.
 pub(crate) const LEAST_HOLDERS: u32 = 4;
@@ -245,30 +248,6 @@ impl Pager {
         }
     }
 
-    /// Asks for every page for which there is a place.
-    pub fn load_all(&mut self) {
-        for page in 0..self.file.header.pages {
-            if self.table[page as usize] == NONE && !self.rests(page) {
-                let Some(holder) = self.takeable(Class::Free, self.frame) else { break };
-                self.ask(page, holder, false);
-            }
-        }
-        self.post();
-    }
-
-    /// Takes back a place holder that is to be filled with something not urgent.
-    fn withdraw(&mut self) -> Option<u32> {
-        let at = self.outbox.iter().rposition(|command| !command.urgent);
-        let command = at.map(|at| self.outbox.remove(at)).or_else(|| self.board.take_back())?;
-        self.table[command.page as usize] = NONE;
-        self.pending -= 1;
-        let holder = &mut self.holders[command.holder as usize];
-        holder.words = command.words;
-        holder.page = NONE;
-        self.promoted.retain(|&page| page != command.page);
-        Some(command.holder)
-    }
-
     /// Where a page is, if it is in memory.
     #[inline(always)]
     pub fn find(&self, page: u32) -> Option<u32> {
@@ -279,29 +258,6 @@ impl Pager {
     pub fn page(&self, holder: u32) -> Page<'_> {
         let holder = &self.holders[holder as usize];
         Page { words: &holder.words, layout: &holder.layout }
-    }
-
-    /// Whether every page is in memory. Then nothing is asked for and nothing evicted until less memory is allowed, and
-    /// neither lists nor reference counts are kept: see [`recount`](Self::recount).
-    #[inline(always)]
-    fn is_complete(&self) -> bool {
-        self.resident == self.file.header.pages
-    }
-
-    /// Makes reference counts and lists what the usage counts ask for.
-    fn recount(&mut self) {
-        self.references.fill(0);
-        self.holders.iter_mut().for_each(|holder| holder.counted = false);
-        for page in 0..self.file.header.pages {
-            self.classify(page);
-        }
-        for page in 0..self.file.header.pages {
-            if self.usage[page as usize] > 0
-                && let Some(holder) = self.find(page)
-            {
-                self.count_around(holder, true);
-            }
-        }
     }
 
     /// Starts to read where a page is into the cache.
@@ -317,129 +273,6 @@ impl Pager {
         prefetch(&self.holders, holder as usize);
     }
 
-    /// A change has been made on a page: what is around it may be needed soon.
-    #[inline(always)]
-    pub fn touch(&mut self, holder: u32) {
-        if !self.is_complete() && self.holders[holder as usize].touched != self.frame {
-            self.touch_first(holder);
-        }
-    }
-
-    fn touch_first(&mut self, holder: u32) {
-        self.holders[holder as usize].touched = self.frame;
-        self.classify(self.holders[holder as usize].page);
-        if let Some(class) = self.lists.class(holder) {
-            self.lists.push(holder, class);
-        }
-        let parent = self.holders[holder as usize].layout.parent;
-        if parent != NONE {
-            self.prefetch(parent);
-        }
-    }
-
-    /// A node has been unfolded: the pages to which the nodes below it lead may be needed next.
-    #[inline(always)]
-    pub fn look_ahead(&mut self, holder: u32, slot: u32) {
-        if !self.is_complete() {
-            self.look_below(holder, slot);
-        }
-    }
-
-    fn look_below(&mut self, holder: u32, slot: u32) {
-        // In preorder the first levels below a node are not next to each other: a stack, of at most one entry a level.
-        let mut stack = [(slot, 1); AHEAD + 1];
-        let mut len = 1;
-        while len > 0 {
-            len -= 1;
-            let (slot, level) = stack[len];
-            for child in self.page(holder).node(slot).children() {
-                match child {
-                    Child::Slot(below) if level < AHEAD => {
-                        stack[len] = (below, level + 1);
-                        len += 1;
-                    }
-                    Child::Slot(_) | Child::Leaf => {}
-                    Child::Link(link) => {
-                        let page = self.page(holder).link(link).node.0 >> self.file.header.slot_bits;
-                        self.prefetch(page);
-                    }
-                }
-            }
-        }
-    }
-
-    /// Nodes of the front have come to a page or left it.
-    #[inline(always)]
-    pub fn count_usage(&mut self, page: u32, by: i32) {
-        let before = self.usage[page as usize];
-        // A count never exceeds the children of the nodes on a page.
-        let now = (i32::from(before) + by) as u16;
-        self.usage[page as usize] = now;
-        if (before == 0) != (now == 0) && !self.is_complete() {
-            self.switch_usage(page, now > 0);
-        }
-    }
-
-    fn switch_usage(&mut self, page: u32, in_use: bool) {
-        self.classify(page);
-        match self.find(page) {
-            Some(holder) => self.count_around(holder, in_use),
-            None if in_use => self.prefetch(page),
-            None => {}
-        }
-    }
-
-    /// Tells the pages around one that is in memory whether it is in use.
-    fn count_around(&mut self, holder: u32, in_use: bool) {
-        let Holder { counted, layout, .. } = &mut self.holders[holder as usize];
-        if std::mem::replace(counted, in_use) == in_use {
-            return;
-        }
-        let Layout { parent, first_child, children, .. } = *layout;
-        let guarded = self.guarded;
-        if in_use {
-            self.guarded = holder;
-        }
-        let parent = Some(parent).filter(|&parent| parent != NONE);
-        for page in parent.into_iter().chain(first_child..first_child + children) {
-            let count = &mut self.references[page as usize];
-            *count = if in_use { *count + 1 } else { count.saturating_sub(1) };
-            if *count == u16::from(in_use) {
-                self.classify(page);
-                if in_use {
-                    self.prefetch(page);
-                }
-            }
-        }
-        self.guarded = guarded;
-    }
-
-    /// Puts a page's place holder into the list where it belongs.
-    fn classify(&mut self, page: u32) {
-        let Some(holder) = self.find(page) else { return };
-        if page < self.kept {
-            self.lists.remove(holder);
-            return;
-        }
-        let untouched = self.holders[holder as usize].touched == 0;
-        let class = match (self.usage[page as usize], self.references[page as usize]) {
-            (0, 0) => Class::Free,
-            // Where pages yield, what has been of no use yet goes first.
-            _ if self.in_use == InUse::Yields => {
-                if untouched {
-                    Class::Prefetched
-                } else {
-                    Class::InUse
-                }
-            }
-            (0, _) => Class::Prefetched,
-            _ => Class::InUse,
-        };
-        if self.lists.class(holder) != Some(class) {
-            self.lists.push(holder, class);
-        }
-    }
-
     /// Drops the page from a place holder.
     fn evict(&mut self, holder: u32) {
         let page = std::mem::replace(&mut self.holders[holder as usize].page, NONE);
@@ -448,101 +281,6 @@ impl Pager {
             self.table[page as usize] = NONE;
             self.resident -= 1;
         }
-    }
-
-    /// The first place holder of a list, if it may be taken: not if it has been touched in this frame, or has come in
-    /// answer to an urgent request at its start.
-    fn takeable(&self, class: Class, before: u64) -> Option<u32> {
-        let is_free =
-            |&holder: &u32| holder != self.guarded && self.holders[holder as usize].touched < before;
-        self.lists.front(class).filter(is_free)
-    }
-
-    /// The place holder that has not been touched for longest, and not since a frame. Empty ones count as never touched.
-    fn oldest(&self, before: u64) -> Option<u32> {
-        let fronts = [Class::Free, Class::Prefetched, Class::InUse].map(|class| self.takeable(class, before));
-        fronts.into_iter().flatten().min_by_key(|&holder| self.holders[holder as usize].touched)
-    }
-
-    /// Asks for a page that is likely to be needed, if there is a place for it.
-    fn prefetch(&mut self, page: u32) {
-        if self.table[page as usize] != NONE {
-            return;
-        }
-        if self.rests(page) {
-            return self.give_up(page);
-        }
-        let place = match self.in_use {
-            InUse::Stays => self.takeable(Class::Free, self.frame),
-            InUse::Yields => self.oldest(self.frame.saturating_sub(IDLE).max(1)),
-        };
-        match place {
-            Some(holder) => self.ask(page, holder, false),
-            None => self.give_up(page),
-        }
-    }
-
-    fn give_up(&mut self, page: u32) {
-        if self.given_up.len() == MOST_GIVEN_UP {
-            self.given_up.pop_front();
-        }
-        self.given_up.push_back(page);
-    }
-
-    /// Asks for a page that is missing at a change.
-    pub fn urge(&mut self, page: u32, switch: Switch) {
-        match self.table[page as usize] {
-            NONE => {}
-            pending if pending & PENDING != 0 => {
-                match self.outbox.iter_mut().find(|command| command.page == page) {
-                    Some(command) => command.urgent = true,
-                    None => self.promoted.push(page),
-                }
-                return;
-            }
-            _ => return,
-        }
-        if !self.rests(page)
-            && let Some(holder) = self.place(switch)
-        {
-            self.ask(page, holder, true);
-        }
-    }
-
-    /// A place for an urgent request.
-    fn place(&mut self, switch: Switch) -> Option<u32> {
-        let stays = self.in_use == InUse::Stays;
-        let not_in_use = self.lists.len(Class::Free) + self.lists.len(Class::Prefetched);
-        if switch == Switch::Down && stays && not_in_use < 3 {
-            return None;
-        }
-        if !stays {
-            return self.oldest(self.frame).or_else(|| self.withdraw());
-        }
-        let free = self.takeable(Class::Free, self.frame);
-        let place = free.or_else(|| self.takeable(Class::Prefetched, self.frame)).or_else(|| self.withdraw());
-        place.or_else(|| self.takeable(Class::InUse, self.frame).filter(|_| switch == Switch::Up))
-    }
-
-    /// Whether a page has failed so recently that it is left alone for now.
-    fn rests(&self, page: u32) -> bool {
-        !self.failures.is_empty()
-            && self.failures.get(&page).is_some_and(|failure| failure.until > self.frame)
-    }
-
-    fn ask(&mut self, page: u32, holder: u32, urgent: bool) {
-        self.evict(holder);
-        self.lists.remove(holder);
-        let room = self.file.header.largest_words as usize;
-        let slot = &mut self.holders[holder as usize];
-        slot.page = page;
-        let mut words = std::mem::take(&mut slot.words);
-        if words.len() != room {
-            words = vec![0; room].into();
-        }
-        self.table[page as usize] = PENDING | holder;
-        self.pending += 1;
-        self.outbox.push(Command { page, holder, words, urgent });
     }
 
     /// Starts a frame: takes what has arrived. Says whether anything has.
