@@ -113,7 +113,7 @@ pub(crate) struct Pager {
     references: Vec<u16>,
     holders: Vec<Holder>,
     lists: Lists,
-    /// K, and how many place holders there are; more than K only while the last too many are on their way.
+    /// K, and how many place holders there are.
     allowed: u32,
     live: u32,
     /// Place holders that are there only in name.
@@ -130,6 +130,8 @@ pub(crate) struct Pager {
     outbox: Vec<Command>,
     promoted: Vec<u32>,
     done: Vec<Done>,
+    /// Whether anything has arrived between two frames.
+    arrived_between: bool,
     stats: PageStats,
     last_fault: Option<MetaNodeError>,
 }
@@ -167,6 +169,7 @@ impl Pager {
             outbox: Vec::new(),
             promoted: Vec::new(),
             done: Vec::new(),
+            arrived_between: false,
             stats: PageStats::default(),
             last_fault: None,
             file,
@@ -225,7 +228,7 @@ impl Pager {
         Ok(())
     }
 
-    /// Gives place holders up until there are no more than allowed, except those that are being filled right now.
+    /// Gives place holders up until there are no more than allowed.
     fn shrink(&mut self) {
         while self.live > self.allowed {
             let lists = &self.lists;
@@ -238,6 +241,12 @@ impl Pager {
                 }
                 None => match self.withdraw() {
                     Some(holder) => holder,
+                    // What has come meanwhile can go too. Then one at most is being read, and with the roots that are
+                    // kept that is no more than is allowed.
+                    None if self.take_arrivals() => {
+                        self.arrived_between = true;
+                        continue;
+                    }
                     None => return,
                 },
             };
@@ -283,9 +292,17 @@ impl Pager {
         }
     }
 
-    /// Starts a frame: takes what has arrived. Says whether anything has.
+    /// Starts a frame: takes what has arrived. Says whether anything has since the frame before.
     pub fn begin_frame(&mut self) -> bool {
         self.frame += 1;
+        let since = std::mem::take(&mut self.arrived_between);
+        let now = self.take_arrivals();
+        self.shrink();
+        since || now
+    }
+
+    /// Takes what has arrived, and says whether anything has.
+    fn take_arrivals(&mut self) -> bool {
         let mut done = std::mem::take(&mut self.done);
         self.board.collect(&mut done);
         let any = !done.is_empty();
@@ -296,7 +313,6 @@ impl Pager {
             }
         }
         self.done = done;
-        self.shrink();
         any
     }
 
