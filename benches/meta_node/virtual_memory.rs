@@ -133,7 +133,8 @@ fn sort(log: &CollapseLog, nodes: &mut [Node], vertex: &[u32]) -> (Vec<[u32; 3]>
             let mut leaves = leaves;
             if let Some(&Node { first, end, .. }) = nodes.get(bringer as usize) {
                 // The corner that is not below the node comes first.
-                leaves.rotate_left(leaves.iter().position(|leaf| !(first..end).contains(leaf)).unwrap_or(0));
+                let far = leaves.iter().position(|leaf| !(first..end).contains(leaf)).unwrap_or(0);
+                leaves.rotate_left(far);
             }
             all.push((bringer, leaves));
         }

@@ -93,9 +93,12 @@ impl Board {
         self.posted.notify_one();
     }
 
-    /// Navigation: takes back the last of the commands that wait and are not urgent.
-    pub fn take_back(&self) -> Option<Command> {
-        self.lock().prefetch.pop_back()
+    /// Navigation: takes back the last of the commands that wait and are not urgent, or else, if it must be, of those that
+    /// are.
+    pub fn take_back(&self, even_urgent: bool) -> Option<Command> {
+        let mut state = self.lock();
+        let prefetch = state.prefetch.pop_back();
+        prefetch.or_else(|| if even_urgent { state.urgent.pop_back() } else { None })
     }
 
     /// Navigation: takes what has been done.
@@ -182,10 +185,11 @@ mod tests {
         board.post(&mut vec![command(0, false), command(1, false), command(2, false)], &mut Vec::new());
         board.post(&mut vec![command(3, true)], &mut vec![1]);
         board.collect(&mut done);
-        back.extend(board.take_back());
+        back.extend(board.take_back(false));
+        back.extend(board.take_back(true));
         board.post(&mut vec![command(4, true)], &mut vec![2, 7]);
         board.settle();
-        assert!(board.take_back().is_none(), "nothing waits after settling");
+        assert!(board.take_back(true).is_none(), "nothing waits after settling");
         board.collect(&mut done);
         assert!(done.iter().all(|done| done.command.words[..] == [done.command.page]), "{done:?}");
         let mut pages: Vec<u32> =

@@ -239,7 +239,7 @@ impl Pager {
                     self.evict(holder);
                     holder
                 }
-                None => match self.withdraw() {
+                None => match self.withdraw(true) {
                     Some(holder) => holder,
                     // What has come meanwhile can go too. Then one at most is being read, and with the roots that are
                     // kept that is no more than is allowed.

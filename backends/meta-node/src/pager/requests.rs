@@ -19,10 +19,10 @@ impl Pager {
         self.post();
     }
 
-    /// Takes back a place holder that is to be filled with something not urgent.
-    pub(super) fn withdraw(&mut self) -> Option<u32> {
-        let at = self.outbox.iter().rposition(|command| !command.urgent);
-        let command = at.map(|at| self.outbox.remove(at)).or_else(|| self.board.take_back())?;
+    /// Takes back a place holder that is to be filled, with something not urgent if there is a choice.
+    pub(super) fn withdraw(&mut self, even_urgent: bool) -> Option<u32> {
+        let at = self.outbox.iter().rposition(|command| even_urgent || !command.urgent);
+        let command = at.map(|at| self.outbox.remove(at)).or_else(|| self.board.take_back(even_urgent))?;
         self.table[command.page as usize] = NONE;
         self.pending -= 1;
         let holder = &mut self.holders[command.holder as usize];
@@ -130,10 +130,11 @@ impl Pager {
             return None;
         }
         if !stays {
-            return self.oldest(self.frame).or_else(|| self.withdraw());
+            return self.oldest(self.frame).or_else(|| self.withdraw(false));
         }
         let free = self.takeable(Class::Free, self.frame);
-        let place = free.or_else(|| self.takeable(Class::Prefetched, self.frame)).or_else(|| self.withdraw());
+        let place =
+            free.or_else(|| self.takeable(Class::Prefetched, self.frame)).or_else(|| self.withdraw(false));
         place.or_else(|| self.takeable(Class::InUse, self.frame).filter(|_| switch == Switch::Up))
     }
 
