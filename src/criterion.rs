@@ -76,7 +76,11 @@ impl Criterion {
     #[inline]
     #[must_use]
     pub fn unfold(self, views: &[View], bounds: &Bounds) -> bool {
-        views.iter().any(|view| self.unfold_for(view, bounds))
+        // One view is the rule, and worth a test without a loop around it.
+        match views {
+            [view] => self.unfold_for(view, bounds),
+            _ => views.iter().any(|view| self.unfold_for(view, bounds)),
+        }
     }
 
     /// Whether one view wants the node unfolded.

@@ -172,7 +172,8 @@ pub struct Engine<T, M> {
     flips: Flips,
     stack: Vec<Pending>,
     missing: Vec<NodeId>,
-    blocked: Vec<NodeId>,
+    blocked: Vec<Noted>,
+    forbidden: Vec<NodeId>,
     still_needed: Vec<Noted>,
     folding: Vec<Noted>,
     unfolding: Vec<Noted>,
@@ -215,6 +216,7 @@ impl<T: VertexTree, M: MeshSink> Engine<T, M> {
             stack: Vec::new(),
             missing: Vec::new(),
             blocked: Vec::new(),
+            forbidden: Vec::new(),
             still_needed: Vec::new(),
             folding: Vec::new(),
             unfolding: Vec::new(),
@@ -324,6 +326,7 @@ impl<T: VertexTree, M: MeshSink> Engine<T, M> {
             stack: &mut self.stack,
             missing: &mut self.missing,
             blocked: &mut self.blocked,
+            forbidden: &mut self.forbidden,
             still_needed: &mut self.still_needed,
             folding: &mut self.folding,
             unfolding: &mut self.unfolding,
@@ -332,6 +335,7 @@ impl<T: VertexTree, M: MeshSink> Engine<T, M> {
         };
         step.missing.clear();
         step.blocked.clear();
+        step.forbidden.clear();
         note(step.front, &self.flips.fold, step.folding);
         note(step.front, &self.flips.unfold, step.unfolding);
         let applied = match self.settings.work_cap {
@@ -347,7 +351,7 @@ impl<T: VertexTree, M: MeshSink> Engine<T, M> {
             nodes.dedup();
             nodes.len() as u64
         };
-        let (misses, blocked) = (distinct(&mut self.missing), distinct(&mut self.blocked));
+        let (misses, blocked) = (distinct(&mut self.missing), distinct(&mut self.forbidden));
         let apply = found.elapsed();
         self.finder.settle(&frame);
         applied?;
@@ -401,7 +405,9 @@ struct Steps<'a, T, M> {
     /// Nodes whose change was refused for want of a page; some more than once.
     missing: &'a mut Vec<NodeId>,
     /// Nodes whose change a rule of the backend's own forbade; some more than once.
-    blocked: &'a mut Vec<NodeId>,
+    forbidden: &'a mut Vec<NodeId>,
+    /// The same while others may yet make them possible.
+    blocked: &'a mut Vec<Noted>,
     /// Nodes that no view wants and that something else still needs.
     still_needed: &'a mut Vec<Noted>,
     /// Collapsible nodes to fold and boundary nodes to unfold, in this order. What follows from a change goes to the end,
@@ -416,12 +422,35 @@ impl<T: VertexTree, M: MeshSink> Steps<'_, T, M> {
     /// Folds, then unfolds, and whatever follows.
     fn apply(&mut self) -> Result<(), TreeError> {
         self.take_turns(Kind::Fold)?;
+        // What a rule forbade when its turn came may have become possible since: to a fixpoint, so that the order in which
+        // a strategy finds changes does not matter.
+        let mut before = None;
+        while !self.blocked.is_empty() && before != Some(self.counts.folds) {
+            before = Some(self.counts.folds);
+            self.folding.clear();
+            self.folding.append(self.blocked);
+            self.take_turns(Kind::Fold)?;
+        }
+        self.forbid();
         self.take_turns(Kind::Unfold)?;
+        let mut before = None;
+        while !self.blocked.is_empty() && before != Some(self.counts.unfolds) {
+            before = Some(self.counts.unfolds);
+            self.unfolding.clear();
+            self.unfolding.append(self.blocked);
+            self.take_turns(Kind::Unfold)?;
+        }
         self.let_go()
+    }
+
+    /// What is blocked now stays so in this frame.
+    fn forbid(&mut self) {
+        self.forbidden.extend(self.blocked.drain(..).map(|(_, node)| node));
     }
 
     /// What was needed when its turn came may have been let go since.
     fn let_go(&mut self) -> Result<(), TreeError> {
+        self.forbid();
         let mut before = None;
         while !self.still_needed.is_empty() && before != Some(self.counts.folds) {
             before = Some(self.counts.folds);
@@ -572,7 +601,7 @@ impl<T: VertexTree, M: MeshSink> Steps<'_, T, M> {
                 return Ok(());
             }
             Step::Blocked => {
-                self.blocked.push(node);
+                self.blocked.push((slot, node));
                 self.refused(slot, Kind::Fold);
                 return Ok(());
             }
@@ -604,8 +633,25 @@ impl<T: VertexTree, M: MeshSink> Steps<'_, T, M> {
 
     /// Unfolds a boundary node that some view wants, and before it what the backend says it needs. Children that are
     /// wanted too follow.
-    fn unfold(&mut self, noted: Noted) -> Result<(), TreeError> {
-        self.stack.push(Pending::wanted(noted));
+    #[inline(always)]
+    fn unfold(&mut self, (slot, node): Noted) -> Result<(), TreeError> {
+        if !is_boundary(self.front, (slot, node)) {
+            return Ok(());
+        }
+        match self.tree.unfold(node, self.mesh)? {
+            Step::Done => self.unfolded(slot),
+            step => {
+                self.stack.push(Pending::wanted((slot, node)));
+                self.wait_or_give_up((slot, node), step);
+                self.unfold_needed()?;
+            }
+        }
+        Ok(())
+    }
+
+    /// Unfolds what waits on the stack, from the top.
+    #[cold]
+    fn unfold_needed(&mut self) -> Result<(), TreeError> {
         while let Some(&Pending { slot, node, needed, .. }) = self.stack.last() {
             let slot = if slot == Slot::NONE { self.front.find(self.tree, node) } else { slot };
             if self.front.node(slot) == node && self.front.record(slot).is_active() {
@@ -626,51 +672,58 @@ impl<T: VertexTree, M: MeshSink> Steps<'_, T, M> {
                 continue;
             }
             match self.tree.unfold(node, self.mesh)? {
-                Step::Done => {}
-                Step::Needs(other) if !self.is_active(other) && !self.waits(other) => {
-                    if let Some(pending) = self.stack.last_mut() {
-                        pending.waits = true;
+                Step::Done => {
+                    self.stack.pop();
+                    if needed && !self.wanted(slot) {
+                        self.counts.forced += 1;
                     }
-                    self.stack.push(Pending::needed(other));
-                    continue;
+                    self.unfolded(slot);
                 }
-                Step::Blocked => {
-                    self.blocked.push(node);
-                    self.give_up();
-                    continue;
-                }
-                Step::Needs(_) | Step::NotResident | Step::StillNeeded => {
-                    self.missing.push(node);
-                    self.give_up();
-                    continue;
-                }
-            }
-            self.stack.pop();
-            self.counts.unfolds += 1;
-            if needed && !self.wanted(slot) {
-                self.counts.forced += 1;
-            }
-            self.finder.unwatch(slot);
-            for parent in self.front.parents(self.tree, slot) {
-                if self.front.record(parent).is_collapsible() {
-                    self.finder.unwatch(parent);
-                }
-            }
-            self.front.set_active(self.tree, slot);
-            self.watch(slot, Kind::Fold);
-            for child in self.front.children(self.tree, slot) {
-                let record = self.front.record(child);
-                if T::IS_TREE || record.is_boundary() {
-                    self.tests += 1;
-                    if self.frame.unfold(&record.bounds) {
-                        self.unfolding.push((child, record.node));
-                    } else {
-                        self.finder.watch(self.frame, child, Kind::Unfold, record.bounds);
-                    }
-                }
+                step => self.wait_or_give_up((slot, node), step),
             }
         }
         Ok(())
+    }
+
+    /// The node on top of the stack has not been unfolded: what it needs goes on top of it, or it is left for later.
+    fn wait_or_give_up(&mut self, (slot, node): Noted, step: Step) {
+        match step {
+            Step::Needs(other) if !self.is_active(other) && !self.waits(other) => {
+                if let Some(pending) = self.stack.last_mut() {
+                    pending.waits = true;
+                }
+                self.stack.push(Pending::needed(other));
+                return;
+            }
+            Step::Blocked => self.blocked.push((slot, node)),
+            Step::Done | Step::Needs(_) | Step::NotResident | Step::StillNeeded => self.missing.push(node),
+        }
+        self.give_up();
+    }
+
+    /// The backend has unfolded a node.
+    #[inline(always)]
+    fn unfolded(&mut self, slot: Slot) {
+        self.counts.unfolds += 1;
+        self.finder.unwatch(slot);
+        for parent in self.front.parents(self.tree, slot) {
+            if self.front.record(parent).is_collapsible() {
+                self.finder.unwatch(parent);
+            }
+        }
+        self.front.set_active(self.tree, slot);
+        self.watch(slot, Kind::Fold);
+        for child in self.front.children(self.tree, slot) {
+            let record = self.front.record(child);
+            if T::IS_TREE || record.is_boundary() {
+                self.tests += 1;
+                if self.frame.unfold(&record.bounds) {
+                    self.unfolding.push((child, record.node));
+                } else {
+                    self.finder.watch(self.frame, child, Kind::Unfold, record.bounds);
+                }
+            }
+        }
     }
 
     fn is_active(&self, node: NodeId) -> bool {

@@ -91,6 +91,8 @@ pub mod scene;
 pub mod simplify;
 pub mod view;
 
+#[cfg(feature = "detail-block")]
+pub use detail_block;
 pub use glam;
 #[cfg(feature = "in-memory")]
 pub use in_memory;

@@ -184,6 +184,7 @@ impl<T: VertexTree, M: MeshSink> Objects<T, M> {
             unfolds: 0,
             folds: 0,
             forced: 0,
+            carried: 0,
             blocked: 0,
             carried: 0,
             misses: 0,
@@ -222,6 +223,7 @@ fn add(all: &mut FrameReport, report: &FrameReport, number: u64) {
     all.unfolds += report.unfolds;
     all.folds += report.folds;
     all.forced += report.forced;
+    all.carried += report.carried;
     all.blocked += report.blocked;
     all.carried += report.carried;
     all.misses += report.misses;

@@ -12,22 +12,37 @@ use foldfront::cut::Displayed;
 use foldfront::engine::{Engine, FrameReport, Settings};
 use foldfront::oracle::Oracle;
 use foldfront::refine::Strategy;
+use foldfront::vertex_tree::source::MemorySource;
 use foldfront::vertex_tree::{NullSink, VertexTree};
 use foldfront::view::View;
 use in_memory::{Hierarchy, InMemoryTree};
+use meta_node::{MetaNodeFile, MetaNodeTree};
 use mt_partition::{BuildOptions, MtTree};
 
 use super::graph_cut::{self, GraphCut};
 use super::settled::Settled;
 
+use super::detail_block as detail;
+
 /// Opens a hierarchy once for each of the settings.
 type Open = fn(&CollapseLog, &[Settings]) -> Vec<Box<dyn Follower>>;
 
 /// The backends and how to open them.
-const BACKENDS: [(&str, Open); 3] = [
+const BACKENDS: [(&str, Open); 6] = [
     ("in-memory", |log, settings| {
         let hierarchy = Arc::new(Hierarchy::new(log).unwrap());
         follow(settings, || InMemoryTree::new(hierarchy.clone()))
+    }),
+    ("meta-node", |log, settings| {
+        // With memory for everything, all of it there from the first frame on: every frame is settled. What paging does
+        // to the cut is in `tests/meta_node`.
+        let file = meta_node_file(log, &meta_node::BuildOptions::default());
+        follow(settings, || {
+            let mut tree = MetaNodeTree::new(file.clone(), meta_node::Settings::default()).unwrap();
+            tree.load_all();
+            tree.settle().unwrap();
+            tree
+        })
     }),
     // The multi-triangulation as it is, whose nodes are the collapses, and reduced, where they are groups of them.
     ("mt-partition unreduced", |log, settings| {
@@ -42,7 +57,25 @@ const BACKENDS: [(&str, Open); 3] = [
         let own = |settings| OwnGraph { engine: engine(settings), cut: cut.clone() };
         settings.iter().map(|settings| Box::new(own(settings)) as Box<dyn Follower>).collect()
     }),
+    // As in the paper, where frames wait for blocks; and quantised, by an I/O thread that is waited for.
+    ("detail-block", |log, settings| detail::follow(log, settings, false)),
+    ("detail-block quantised", |log, settings| detail::follow(log, settings, true)),
 ];
+
+/// The hierarchy as a file of meta-nodes, kept in memory.
+pub fn meta_node_file(log: &CollapseLog, options: &meta_node::BuildOptions) -> Arc<MetaNodeFile> {
+    Arc::new(
+        MetaNodeFile::open(Arc::new(MemorySource::new("memory", meta_node_bytes(log, options)))).unwrap(),
+    )
+}
+
+/// The bytes of a file of meta-nodes.
+pub fn meta_node_bytes(log: &CollapseLog, options: &meta_node::BuildOptions) -> Vec<u8> {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("tree");
+    meta_node::write(&path, log, options).unwrap();
+    std::fs::read(path).unwrap()
+}
 
 fn follow<T: VertexTree + 'static>(settings: &[Settings], tree: impl Fn() -> T) -> Vec<Box<dyn Follower>> {
     let engine = |&settings: &Settings| Engine::new(tree(), NullSink, settings).unwrap();
@@ -50,7 +83,7 @@ fn follow<T: VertexTree + 'static>(settings: &[Settings], tree: impl Fn() -> T) 
 }
 
 /// An engine, whatever its backend.
-trait Follower {
+pub trait Follower {
     fn advance(&mut self, views: &[View]) -> FrameReport;
     fn set_budget(&mut self, budget: Budget);
     fn strategy(&self) -> Strategy;

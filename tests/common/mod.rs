@@ -3,6 +3,7 @@
 
 pub mod backends;
 pub mod data;
+pub mod detail_block;
 pub mod graph_cut;
 pub mod settled;
 pub mod sink;

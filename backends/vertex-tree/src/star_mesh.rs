@@ -110,6 +110,22 @@ impl StarMesh {
         self.stars.leaf(vertex)
     }
 
+    /// The slot of a leaf that is shown; [`NONE`] if it is not.
+    #[must_use]
+    pub fn vertex(&self, leaf: u32) -> VertexId {
+        self.vertex_of_leaf.get(leaf)
+    }
+
+    /// The vertices that share a displayed triangle with one, those across an inner edge twice.
+    pub fn neighbours(&self, vertex: VertexId) -> impl Iterator<Item = VertexId> + '_ {
+        let around = self
+            .stars
+            .corners(vertex)
+            .iter()
+            .flat_map(|&corner| self.triangles[triangle_of(corner).0].vertices);
+        around.filter(move |&other| other != vertex)
+    }
+
     /// The backend's number of the triangle in a slot; [`NONE`] in a hole.
     #[must_use]
     pub fn number(&self, triangle: TriangleId) -> u32 {

@@ -1,0 +1,204 @@
+//! A file of meta-nodes, open for reading.
+
+use std::sync::Arc;
+
+use vertex_tree::source::PageSource;
+use vertex_tree::{Bounds, NodeId};
+
+use crate::error::MetaNodeError;
+use crate::format::{HEADER_BYTES, Header, ROOT_WORDS, Root, TRIANGLE_WORDS, VERTEX_WORDS};
+use crate::page::{self, Layout};
+
+/// An open file: header, base mesh and the index of the pages are in memory, the pages are not. Shared, unchanging:
+/// several trees can show it at once, each with place holders of its own.
+pub struct MetaNodeFile {
+    source: Arc<dyn PageSource>,
+    pub(crate) header: Header,
+    pub(crate) roots: Vec<Root>,
+    pub(crate) base_vertices: Vec<(u32, [f32; 3])>,
+    pub(crate) base_triangles: Vec<[u32; 3]>,
+    /// Words of each page.
+    lengths: Vec<u32>,
+    /// Where every 64th page starts, in words from the first page: 1/16 of the memory of an offset a page.
+    starts: Vec<u64>,
+}
+
+/// Pages between two entries of [`MetaNodeFile::starts`].
+const STRIDE: usize = 64;
+
+impl std::fmt::Debug for MetaNodeFile {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        f.debug_struct("MetaNodeFile").field("name", &self.name()).field("header", &self.header).finish()
+    }
+}
+
+impl MetaNodeFile {
+    /// Reads header and tables, and checks them.
+    ///
+    /// # Errors
+    /// Whatever is wrong with them.
+    pub fn open(source: Arc<dyn PageSource>) -> Result<Self, MetaNodeError> {
+        let header = Header::read(&*source)?;
+        let mut words = vec![0; (header.tables_bytes() / 4) as usize];
+        read_words(&*source, HEADER_BYTES, &mut words)?;
+        if table_checksum(&words) != header.tables_checksum {
+            let file = source.name().to_owned();
+            return Err(MetaNodeError::Checksum { file, offset: HEADER_BYTES, section: "tables" });
+        }
+        let (roots, rest) = words.split_at(header.roots as usize * ROOT_WORDS);
+        let (vertices, rest) = rest.split_at(header.base_vertices as usize * VERTEX_WORDS);
+        let (triangles, lengths) = rest.split_at(header.base_triangles as usize * TRIANGLE_WORDS);
+        let f = f32::from_bits;
+        let roots: Vec<Root> = roots
+            .chunks_exact(ROOT_WORDS)
+            .map(|w| Root {
+                node: NodeId(w[0]),
+                log_number: w[1],
+                bounds: Bounds { center: [f(w[2]), f(w[3]), f(w[4])], radius: f(w[5]), eps: f(w[6]) },
+            })
+            .collect();
+        let base_vertices: Vec<(u32, [f32; 3])> =
+            vertices.chunks_exact(VERTEX_WORDS).map(|w| (w[0], [f(w[1]), f(w[2]), f(w[3])])).collect();
+        let base_triangles: Vec<[u32; 3]> =
+            triangles.chunks_exact(TRIANGLE_WORDS).map(|w| [w[0], w[1], w[2]]).collect();
+        let mut starts = Vec::with_capacity(lengths.len() / STRIDE + 1);
+        let mut total = 0_u64;
+        for (page, &length) in lengths.iter().enumerate() {
+            if page % STRIDE == 0 {
+                starts.push(total);
+            }
+            total += u64::from(length);
+        }
+        let opened =
+            Self { header, roots, base_vertices, base_triangles, lengths: lengths.to_vec(), starts, source };
+        opened.check_tables(total)?;
+        Ok(opened)
+    }
+
+    fn check_tables(&self, total_words: u64) -> Result<(), MetaNodeError> {
+        let header = &self.header;
+        let error = |offset: usize, what: &'static str, value: u64| {
+            Err(MetaNodeError::Value { file: self.name().to_owned(), offset: offset as u64, what, value })
+        };
+        let mut at = HEADER_BYTES as usize;
+        let mut before = None;
+        for root in &self.roots {
+            let (page, number) = (root.node.0 >> header.slot_bits, root.node.0);
+            if page >= header.root_pages || before.is_some_and(|before| before >= number) {
+                return error(at, "the number of a root", number.into());
+            }
+            if root.log_number >= header.collapses || !page::are_sane(&root.bounds) {
+                return error(at + 4, "the number in the log of a root", root.log_number.into());
+            }
+            before = Some(number);
+            at += 4 * ROOT_WORDS;
+        }
+        let mut least = 0;
+        for &(leaf, position) in &self.base_vertices {
+            if leaf < least || leaf >= header.leaves || !position.iter().all(|x| x.is_finite()) {
+                return error(at, "the leaf of a base vertex", leaf.into());
+            }
+            least = leaf + 1;
+            at += 4 * VERTEX_WORDS;
+        }
+        for corners in &self.base_triangles {
+            if let Some(&leaf) = corners.iter().find(|&&leaf| leaf >= header.leaves) {
+                return error(at, "the leaf of a base triangle", leaf.into());
+            }
+            at += 4 * TRIANGLE_WORDS;
+        }
+        if self.base_vertices.first().is_some_and(|&(leaf, _)| leaf != 0) {
+            return error(at, "the first leaf of the base mesh", self.base_vertices[0].0.into());
+        }
+        for &length in &self.lengths {
+            if length > header.largest_words {
+                return error(at, "the length of a page", length.into());
+            }
+            at += 4;
+        }
+        if total_words.checked_mul(4) != Some(header.page_bytes) {
+            return error(64, "the length of all pages", header.page_bytes);
+        }
+        Ok(())
+    }
+
+    pub(crate) fn name(&self) -> &str {
+        self.source.name()
+    }
+
+    /// Words of a page.
+    pub(crate) fn page_words(&self, page: u32) -> usize {
+        self.lengths[page as usize] as usize
+    }
+
+    /// Where a page starts, in bytes.
+    pub(crate) fn page_offset(&self, page: u32) -> u64 {
+        let page = page as usize;
+        let from = page / STRIDE * STRIDE;
+        let words: u64 = self.lengths[from..page].iter().map(|&length| u64::from(length)).sum();
+        HEADER_BYTES + self.header.tables_bytes() + 4 * (self.starts[page / STRIDE] + words)
+    }
+
+    /// Bytes of a place holder.
+    pub(crate) fn holder_bytes(&self) -> u64 {
+        4 * u64::from(self.header.largest_words).max(1)
+    }
+
+    /// Reads a page and checks it. `words` has room for the largest.
+    pub(crate) fn read_page(&self, page: u32, words: &mut [u32]) -> Result<Layout, MetaNodeError> {
+        let offset = self.page_offset(page);
+        let words = &mut words[..self.page_words(page)];
+        read_words(&*self.source, offset, words)?;
+        page::check(words, page, &self.header.limits()).map_err(|reason| MetaNodeError::Page {
+            file: self.name().to_owned(),
+            page,
+            offset,
+            reason,
+        })
+    }
+
+    /// What the file holds, in words and numbers.
+    #[must_use]
+    pub fn facts(&self) -> Vec<(&'static str, String)> {
+        let h = &self.header;
+        let bytes = HEADER_BYTES + h.tables_bytes() + h.page_bytes;
+        let mean = |sum: u64, count: u32| sum as f64 / f64::from(count.max(1));
+        vec![
+            ("vertices", h.leaves.to_string()),
+            ("triangles", h.triangles.to_string()),
+            ("nodes", h.collapses.to_string()),
+            ("roots", h.roots.to_string()),
+            ("base triangles", h.base_triangles.to_string()),
+            ("levels of a block", h.levels.to_string()),
+            ("pages", h.pages.to_string()),
+            ("root pages", h.root_pages.to_string()),
+            ("largest page, bytes", self.holder_bytes().to_string()),
+            ("mean page, bytes", format!("{:.0}", mean(h.page_bytes, h.pages))),
+            ("nodes a page", format!("{:.1}", mean(h.collapses.into(), h.pages))),
+            ("bytes", bytes.to_string()),
+            ("bytes a triangle", format!("{:.1}", mean(bytes, h.triangles))),
+            (
+                "least page memory, bytes",
+                (self.holder_bytes() * u64::from(crate::pager::LEAST_HOLDERS)).to_string(),
+            ),
+        ]
+    }
+}
+
+fn read_words(source: &dyn PageSource, offset: u64, words: &mut [u32]) -> Result<(), MetaNodeError> {
+    let bytes: &mut [u8] = bytemuck::cast_slice_mut(words);
+    source.read_at(offset, bytes).map_err(|e| MetaNodeError::Io {
+        file: source.name().to_owned(),
+        offset,
+        length: bytes.len() as u64,
+        source: e,
+    })?;
+    words.iter_mut().for_each(|word| *word = u32::from_le(*word));
+    Ok(())
+}
+
+fn table_checksum(words: &[u32]) -> u32 {
+    let mut hasher = crc32fast::Hasher::new();
+    words.iter().for_each(|word| hasher.update(&word.to_le_bytes()));
+    hasher.finalize()
+}

@@ -1,0 +1,401 @@
+//! The tree that the engine unfolds and folds.
+
+use std::sync::Arc;
+
+use rustc_hash::FxHashSet;
+use vertex_tree::{Bounds, LeafTriangle, MeshSink, NodeId, PageStats, StarMesh, Step, TreeError, VertexTree};
+
+use crate::dependencies::{Dependencies, Half, Rules};
+use crate::error::MetaNodeError;
+use crate::file::MetaNodeFile;
+use crate::page::{Child, Node, Page};
+use crate::pager::{InUse, Pager, Switch};
+
+/// How a tree pages and what it makes of dependencies.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Settings {
+    /// Bytes that place holders may take, at most. Tables of about 8 bytes a page come on top.
+    pub page_memory: u64,
+    /// What is done about neighbours that are too coarse or too fine for a change.
+    pub dependencies: Dependencies,
+    /// What happens to pages with nodes of the front where there is no other place.
+    pub in_use: InUse,
+}
+
+impl Default for Settings {
+    /// Memory for everything, dependencies off, pages yield.
+    fn default() -> Self {
+        Self { page_memory: u64::MAX, dependencies: Dependencies::Off, in_use: InUse::Yields }
+    }
+}
+
+/// A file of meta-nodes, and the state of one front through it.
+///
+/// Everything here runs on the caller's thread, and place holders belong to it; one more thread reads pages (see
+/// `board.rs`). It starts with the tree and ends after it.
+pub struct MetaNodeTree {
+    pager: Pager,
+    roots: Vec<NodeId>,
+    slot_bits: u32,
+    /// Kept for a sink that wants it, and for the rules of dependencies.
+    mesh: Option<StarMesh>,
+    rules: Option<Rules>,
+    displayed: u64,
+    /// Room for the triangles that come with a split.
+    brought: Vec<LeafTriangle>,
+    /// Nodes whose page was missing and has not come yet.
+    refused: FxHashSet<NodeId>,
+}
+
+impl MetaNodeTree {
+    /// A tree with every node folded. The root pages have been asked for.
+    ///
+    /// # Errors
+    /// [`MetaNodeError::Memory`], [`MetaNodeError::Thread`].
+    pub fn new(file: Arc<MetaNodeFile>, settings: Settings) -> Result<Self, MetaNodeError> {
+        let (slot_bits, leaves) = (file.header.slot_bits, file.header.leaves);
+        let roots = file.roots.iter().map(|root| root.node).collect();
+        let mut tree = Self {
+            pager: Pager::new(file, settings.page_memory, settings.in_use)?,
+            roots,
+            slot_bits,
+            mesh: None,
+            rules: Rules::new(settings.dependencies, leaves),
+            displayed: 0,
+            brought: Vec::new(),
+            refused: FxHashSet::default(),
+        };
+        for root in 0..tree.roots.len() {
+            tree.pager.count_usage(tree.roots[root].0 >> slot_bits, 1);
+        }
+        tree.pager.end_frame();
+        Ok(tree)
+    }
+
+    /// The file that the tree shows.
+    #[must_use]
+    pub fn file(&self) -> &Arc<MetaNodeFile> {
+        &self.pager.file
+    }
+
+    /// Sets how much memory place holders may take, between two frames. If it is less than before, pages go at once,
+    /// those first that are of least use.
+    ///
+    /// # Errors
+    /// [`MetaNodeError::Memory`], and nothing has changed.
+    pub fn set_page_memory(&mut self, bytes: u64) -> Result<(), MetaNodeError> {
+        self.pager.set_page_memory(bytes)
+    }
+
+    /// Asks for every page for which there is a free place. Once these have [come](VertexTree::settle), a tree with memory
+    /// for everything misses nothing.
+    pub fn load_all(&mut self) {
+        self.pager.load_all();
+    }
+
+    /// Whether a node's page is in memory.
+    #[must_use]
+    pub fn is_resident(&self, node: NodeId) -> bool {
+        self.pager.find(self.place(node).0).is_some()
+    }
+
+    /// What the last read that failed found, if any has.
+    #[must_use]
+    pub fn last_fault(&self) -> Option<&MetaNodeError> {
+        self.pager.last_fault()
+    }
+
+    /// The page of a node, and its slot there.
+    #[inline(always)]
+    fn place(&self, node: NodeId) -> (u32, u32) {
+        (node.0 >> self.slot_bits, node.0 & ((1 << self.slot_bits) - 1))
+    }
+
+    /// Looks at a node wherever it is. Nodes that the engine asks for have just been changed, and their pages are in
+    /// memory; for any other, such as by a debugger or a checker, the page is read and dropped again. `None` if that
+    /// fails.
+    #[inline(always)]
+    fn look<R>(&self, node: NodeId, f: impl FnOnce(Page, Node) -> R) -> Option<R> {
+        let (page, slot) = self.place(node);
+        match self.pager.find(page) {
+            Some(holder) => {
+                let page = self.pager.page(holder);
+                (slot < page.layout.nodes).then(|| f(page, page.node(slot)))
+            }
+            None => self.look_in_file(page, slot, f),
+        }
+    }
+
+    #[cold]
+    fn look_in_file<R>(&self, page: u32, slot: u32, f: impl FnOnce(Page, Node) -> R) -> Option<R> {
+        let file = &self.pager.file;
+        let mut words = vec![0; file.page_words(page)];
+        let layout = file.read_page(page, &mut words).ok().filter(|layout| slot < layout.nodes)?;
+        let page = Page { words: &words, layout: &layout };
+        Some(f(page, page.node(slot)))
+    }
+
+    /// The place holder of a node's page. If it is missing, it is asked for.
+    #[inline(always)]
+    fn find(&mut self, node: NodeId, switch: Switch) -> Option<u32> {
+        let (page, _) = self.place(node);
+        let found = self.pager.find(page);
+        if found.is_none() {
+            self.pager.urge(page, switch);
+            self.refused.insert(node);
+        }
+        found
+    }
+
+    fn damaged(&self, page: u32) -> TreeError {
+        let file = &self.pager.file;
+        TreeError::Damaged {
+            file: file.name().to_owned(),
+            offset: file.page_offset(page),
+            reason: "a link leads to a node that it does not have",
+        }
+    }
+
+    /// The front moves from a node to its children, or back: counts who is where.
+    #[inline(always)]
+    fn count(&mut self, node: NodeId, children: [Child; 2], holder: u32, by: i32) {
+        let (own, _) = self.place(node);
+        let mut here = -by;
+        for child in children {
+            match child {
+                Child::Leaf | Child::Slot(_) => here += by,
+                Child::Link(link) => {
+                    let below = self.pager.page(holder).link(link).node.0 >> self.slot_bits;
+                    self.pager.count_usage(below, by);
+                }
+            }
+        }
+        if here != 0 {
+            self.pager.count_usage(own, here);
+        }
+    }
+}
+
+impl VertexTree for MetaNodeTree {
+    const IS_TREE: bool = true;
+    const PREPARATION: usize = 3 + StarMesh::PREPARATION;
+
+    fn node_limit(&self) -> u32 {
+        self.pager.file.header.pages << self.slot_bits
+    }
+
+    fn displayed_triangles(&self) -> u64 {
+        self.displayed
+    }
+
+    fn roots(&self) -> &[NodeId] {
+        &self.roots
+    }
+
+    fn bounds(&self, node: NodeId) -> Bounds {
+        if let Ok(at) = self.roots.binary_search(&node) {
+            return self.pager.file.roots[at].bounds;
+        }
+        // A sphere without end, where the page can not be read: such a node counts as inside of every view.
+        let unknown = Bounds { center: [0.0; 3], radius: f32::MAX, eps: f32::MAX };
+        self.look(node, |_, node| node.bounds()).unwrap_or(unknown)
+    }
+
+    #[inline]
+    fn children(&self, node: NodeId) -> impl Iterator<Item = NodeId> {
+        let base = node.0 >> self.slot_bits << self.slot_bits;
+        let children = self.look(node, |page, of| {
+            of.children().map(|child| match child {
+                Child::Leaf => None,
+                Child::Slot(slot) => Some(NodeId(base | slot)),
+                Child::Link(link) => Some(page.link(link).node),
+            })
+        });
+        children.into_iter().flatten().flatten()
+    }
+
+    #[inline]
+    fn children_and_bounds(&self, node: NodeId) -> impl Iterator<Item = (NodeId, Bounds)> {
+        let base = node.0 >> self.slot_bits << self.slot_bits;
+        let children = self.look(node, |page, of| {
+            of.children().map(|child| match child {
+                Child::Leaf => None,
+                Child::Slot(slot) => Some((NodeId(base | slot), page.node(slot).bounds())),
+                Child::Link(link) => {
+                    let link = page.link(link);
+                    Some((link.node, link.bounds))
+                }
+            })
+        });
+        children.into_iter().flatten().flatten()
+    }
+
+    #[inline]
+    fn parents(&self, node: NodeId) -> impl Iterator<Item = NodeId> {
+        let base = node.0 >> self.slot_bits << self.slot_bits;
+        if let Some(above) = self.rules.as_ref().and_then(|rules| rules.above(node)) {
+            return Some(above).filter(|above| above.0 != vertex_tree::NONE).into_iter();
+        }
+        let parent = self.look(node, |page, of| match of.parent() {
+            Ok(slot) => base | slot,
+            Err(block) => page.above(block).0,
+        });
+        parent.filter(|&p| p != vertex_tree::NONE).map(NodeId).into_iter()
+    }
+
+    fn log_number(&self, node: NodeId) -> u32 {
+        self.look(node, |_, node| node.log_number()).unwrap_or(vertex_tree::NONE)
+    }
+
+    fn base_mesh<M: MeshSink>(&mut self, mesh: &mut M) -> Result<(), TreeError> {
+        let file = self.pager.file.clone();
+        self.displayed = file.base_triangles.len() as u64;
+        if !M::KEEPS_MESH && self.rules.is_none() {
+            return Ok(());
+        }
+        let mut stars = StarMesh::new(file.header.leaves as usize);
+        // Base vertices are those of the roots, in their order, and then those that no collapse touches.
+        let mut roots = file.roots.iter();
+        for &(leaf, position) in &file.base_vertices {
+            let vertex = stars.add_vertex(leaf, position, mesh);
+            let half = roots.next().map(|root| (root.node, root.log_number));
+            if let Some(rules) = &mut self.rules {
+                rules.show(vertex, leaf, half, None);
+                rules.enter(half, leaf, None);
+            }
+        }
+        for &leaves in &file.base_triangles {
+            stars.add_triangle(LeafTriangle::new(leaves, 0, 0), mesh);
+        }
+        self.mesh = Some(stars);
+        Ok(())
+    }
+
+    fn unfold<M: MeshSink>(&mut self, node: NodeId, mesh: &mut M) -> Result<Step, TreeError> {
+        if let (Some(rules), Some(stars)) = (&self.rules, &self.mesh)
+            && let Some(step) = rules.may_split(node, stars)
+        {
+            return Ok(step);
+        }
+        let Some(holder) = self.find(node, Switch::Down) else { return Ok(Step::NotResident) };
+        let (own, slot) = self.place(node);
+        let page = self.pager.page(holder);
+        if slot >= page.layout.nodes {
+            return Err(self.damaged(own));
+        }
+        let of = page.node(slot);
+        let (children, leaves) = (of.children(), of.leaves());
+        let (start, end) = page.brought_range(slot);
+        if let Some(stars) = &mut self.mesh {
+            self.brought.clear();
+            self.brought.extend(page.brought(slot).map(|leaves| LeafTriangle::new(leaves, 0, 0)));
+            stars.split(leaves, of.position(), &self.brought, mesh);
+        }
+        self.displayed += u64::from(end - start);
+        if let (Some(rules), Some(stars)) = (&mut self.rules, &self.mesh) {
+            for (leaf, half) in leaves.into_iter().zip(halves(node.0 - slot, page, of)) {
+                rules.show(stars.vertex(leaf), leaf, half, Some(of.log_number()));
+                rules.enter(half, leaf, Some(node));
+            }
+        }
+        self.pager.touch(holder);
+        self.count(node, children, holder, 1);
+        self.pager.look_ahead(holder, slot);
+        Ok(Step::Done)
+    }
+
+    fn fold<M: MeshSink>(&mut self, node: NodeId, mesh: &mut M) -> Result<Step, TreeError> {
+        let Some(holder) = self.find(node, Switch::Up) else { return Ok(Step::NotResident) };
+        let (own, slot) = self.place(node);
+        let page = self.pager.page(holder);
+        if slot >= page.layout.nodes {
+            return Err(self.damaged(own));
+        }
+        let of = page.node(slot);
+        let (children, leaves @ [kept, _], collapse) = (of.children(), of.leaves(), of.log_number());
+        let (start, end) = page.brought_range(slot);
+        if let Some(stars) = &mut self.mesh {
+            if let Some(rules) = &self.rules
+                && let Some(step) = rules.may_merge(collapse, leaves, stars)
+            {
+                return Ok(step);
+            }
+            stars.merge(leaves, mesh);
+            if let Some(rules) = &mut self.rules {
+                halves(node.0 - slot, page, of).into_iter().for_each(|half| rules.leave(half));
+                let parent = match of.parent() {
+                    Ok(slot) => Some(page.node(slot).log_number()),
+                    Err(block) => Some(page.above(block).1).filter(|&above| above != vertex_tree::NONE),
+                };
+                rules.show(stars.vertex(kept), kept, Some((node, collapse)), parent);
+            }
+        }
+        self.displayed -= u64::from(end - start);
+        self.pager.touch(holder);
+        self.count(node, children, holder, -1);
+        Ok(Step::Done)
+    }
+
+    #[inline(always)]
+    fn prepare<M: MeshSink>(&self, node: NodeId, step: usize, mesh: &M) {
+        let (page, slot) = self.place(node);
+        if step == 0 {
+            self.pager.prefetch_table(page);
+            return;
+        }
+        let Some(holder) = self.pager.find(page) else { return };
+        match step {
+            1 => self.pager.prefetch_holder(holder),
+            2 => self.pager.page(holder).prefetch(slot),
+            _ => {
+                let page = self.pager.page(holder);
+                if step == 3 {
+                    page.prefetch_children(slot);
+                }
+                if let Some(stars) = &self.mesh
+                    && slot < page.layout.nodes
+                {
+                    // The triangles that come with a split follow each other in few cache lines.
+                    stars.prepare(page.node(slot).leaves(), &[], step - 3, mesh);
+                }
+            }
+        }
+    }
+
+    fn begin_frame(&mut self, arrived: &mut Vec<NodeId>) -> Result<(), TreeError> {
+        if self.pager.begin_frame() && !self.refused.is_empty() {
+            let (pager, bits) = (&self.pager, self.slot_bits);
+            let before = arrived.len();
+            self.refused.retain(|&node| {
+                let is_here = pager.find(node.0 >> bits).is_some();
+                if is_here {
+                    arrived.push(node);
+                }
+                !is_here
+            });
+            arrived[before..].sort_unstable();
+        }
+        Ok(())
+    }
+
+    fn settle(&mut self) -> Result<(), TreeError> {
+        self.pager.settle();
+        Ok(())
+    }
+
+    fn end_frame(&mut self) -> Result<PageStats, TreeError> {
+        Ok(self.pager.end_frame())
+    }
+}
+
+/// The children of a node that are nodes, with their numbers in the log; `base` is the number of the page's first slot.
+fn halves(base: u32, page: Page, of: Node) -> [Half; 2] {
+    of.children().map(|child| match child {
+        Child::Leaf => None,
+        Child::Slot(slot) => Some((NodeId(base | slot), page.node(slot).log_number())),
+        Child::Link(link) => {
+            let link = page.link(link);
+            Some((link.node, link.log_number))
+        }
+    })
+}

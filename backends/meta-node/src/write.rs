@@ -1,0 +1,221 @@
+//! From a collapse log to a file.
+
+use std::fs::File;
+use std::io::{self, BufWriter, Seek, SeekFrom, Write};
+use std::path::Path;
+
+use vertex_tree::{CollapseLog, NONE, output};
+
+use crate::arrange::{Arrangement, Span};
+use crate::blocking::{self, Blocking};
+use crate::error::MetaNodeError;
+use crate::format::{HEADER_BYTES, Header};
+use crate::page::{self, Child};
+
+/// How a file is laid out.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct BuildOptions {
+    /// Levels of the binary tree in a block, 1 to 12; `None` takes the most with which every block fits a page.
+    pub levels: Option<u32>,
+    /// What a page should hold at most, in bytes. A block that is larger gets a page that is as large.
+    pub page_bytes: u32,
+}
+
+impl Default for BuildOptions {
+    /// Pages of 4096 bytes, as disks have them.
+    fn default() -> Self {
+        Self { levels: None, page_bytes: 4096 }
+    }
+}
+
+/// What was written.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[non_exhaustive]
+pub struct WriteReport {
+    /// Levels of a block.
+    pub levels: u32,
+    /// Blocks of the tree.
+    pub blocks: u64,
+    /// Pages.
+    pub pages: u64,
+    /// Bytes of the largest page.
+    pub largest_page: u64,
+    /// Bytes of the whole file.
+    pub bytes: u64,
+}
+
+/// Writes the hierarchy of a log: whole, or not at all.
+///
+/// Takes time in proportion to the log, and beside the log about 40 bytes a node and 16 a triangle of memory; the file
+/// itself is written page by page.
+///
+/// # Errors
+/// [`MetaNodeError::Log`], [`MetaNodeError::Levels`], [`MetaNodeError::TooLarge`], [`MetaNodeError::Io`].
+pub fn write(path: &Path, log: &CollapseLog, options: &BuildOptions) -> Result<WriteReport, MetaNodeError> {
+    if let Some(levels) = options.levels.filter(|levels| !(1..=page::MOST_LEVELS).contains(levels)) {
+        return Err(MetaNodeError::Levels { levels, most: page::MOST_LEVELS });
+    }
+    let arrangement = Arrangement::new(log)?;
+    let levels = options.levels.unwrap_or_else(|| blocking::levels_for(&arrangement, options.page_bytes));
+    let blocking = Blocking::new(&arrangement, levels, options.page_bytes);
+    let (pages, slots) = (blocking.pages.len() as u64, 1 << blocking.slot_bits);
+    if pages * slots > u64::from(u32::MAX) {
+        return Err(MetaNodeError::TooLarge { pages, slots });
+    }
+    let mut written = Header::default();
+    output::write_with(path, |file| {
+        written = Writer { arrangement: &arrangement, blocking: &blocking }.write(file)?;
+        Ok(())
+    })
+    .map_err(|source| MetaNodeError::Io {
+        file: path.display().to_string(),
+        offset: 0,
+        length: 0,
+        source,
+    })?;
+    Ok(WriteReport {
+        levels,
+        blocks: blocking.blocks.len() as u64,
+        pages,
+        largest_page: 4 * u64::from(written.largest_words),
+        bytes: HEADER_BYTES + written.tables_bytes() + written.page_bytes,
+    })
+}
+
+struct Writer<'a> {
+    arrangement: &'a Arrangement<'a>,
+    blocking: &'a Blocking,
+}
+
+impl Writer<'_> {
+    fn write(&self, file: &mut File) -> io::Result<Header> {
+        let Self { arrangement, blocking } = self;
+        let input = &arrangement.log.mesh;
+        let mut header = Header {
+            leaves: input.positions.len() as u32,
+            collapses: arrangement.spans.len() as u32,
+            triangles: input.triangles.len() as u32,
+            doubled: (input.triangles.len() - arrangement.triangles.len()) as u32,
+            roots: arrangement.roots.len() as u32,
+            base_vertices: arrangement.base_leaves.len() as u32,
+            base_triangles: arrangement.base_triangles().len() as u32,
+            pages: blocking.pages.len() as u32,
+            root_pages: blocking.root_pages,
+            levels: blocking.levels,
+            slot_bits: blocking.slot_bits,
+            ..Header::default()
+        };
+        let mut out = BufWriter::with_capacity(1 << 20, file);
+        // Pages first, since the tables say how long they are.
+        out.seek(SeekFrom::Start(HEADER_BYTES + header.tables_bytes()))?;
+        let (mut words, mut lengths) = (Vec::new(), Vec::with_capacity(blocking.pages.len()));
+        for page in 0..header.pages {
+            words.clear();
+            self.page(page, &mut words);
+            lengths.push(words.len() as u32);
+            header.largest_words = header.largest_words.max(words.len() as u32);
+            header.page_bytes += 4 * words.len() as u64;
+            for word in &words {
+                out.write_all(&word.to_le_bytes())?;
+            }
+        }
+        out.seek(SeekFrom::Start(HEADER_BYTES))?;
+        let mut checksum = crc32fast::Hasher::new();
+        self.tables(&lengths, |word| {
+            checksum.update(&word.to_le_bytes());
+            out.write_all(&word.to_le_bytes())
+        })?;
+        header.tables_checksum = checksum.finalize();
+        out.seek(SeekFrom::Start(0))?;
+        out.write_all(&header.encode())?;
+        out.flush()?;
+        Ok(header)
+    }
+
+    fn tables(&self, lengths: &[u32], mut put: impl FnMut(u32) -> io::Result<()>) -> io::Result<()> {
+        let Self { arrangement, blocking } = self;
+        for &root in &arrangement.roots {
+            let bounds = &arrangement.log.collapses[root as usize].bounds;
+            put(blocking.number[root as usize].0)?;
+            put(root)?;
+            page::bounds_words(bounds).into_iter().try_for_each(&mut put)?;
+        }
+        for &leaf in &arrangement.base_leaves {
+            put(leaf)?;
+            arrangement.position(leaf).into_iter().map(f32::to_bits).try_for_each(&mut put)?;
+        }
+        arrangement.base_triangles().iter().flatten().copied().try_for_each(&mut put)?;
+        lengths.iter().copied().try_for_each(put)
+    }
+
+    /// The words of a page.
+    fn page(&self, page: u32, words: &mut Vec<u32>) {
+        let Self { arrangement, blocking } = self;
+        let nodes_of = &blocking.pages[page as usize];
+        let tops = &blocking.blocks[nodes_of.blocks.clone()];
+        let slot = |n: u32| blocking.number[n as usize].0 & ((1 << blocking.slot_bits) - 1);
+        let mut nodes = Vec::new();
+        for &top in tops {
+            blocking::walk(arrangement, top, blocking.levels, |n| nodes.push(n), |_| ());
+        }
+        words.extend([0; page::HEADER_WORDS]);
+        let (mut links, mut triangles) = (Vec::new(), 0);
+        let is_here = |n: u32| blocking.number[n as usize].0 >> blocking.slot_bits == page;
+        let mut block = 0;
+        for &n in &nodes {
+            let collapse = &arrangement.log.collapses[n as usize];
+            let span = arrangement.spans[n as usize];
+            words.extend(page::bounds_words(&collapse.bounds));
+            words.extend(arrangement.position(span.pivot).map(f32::to_bits));
+            words.extend([span.first, span.pivot, n]);
+            let [kept, removed] = arrangement.children(n).map(|child| match child {
+                NONE => Child::Leaf.encode(),
+                // Blocks that share a page hang below another page: a child here is in the same block.
+                child if is_here(child) => Child::Slot(slot(child)).encode(),
+                child => {
+                    links.push(child);
+                    Child::Link(links.len() as u32 - 1).encode()
+                }
+            });
+            words.push(kept | removed << 16);
+            if tops.get(block) == Some(&n) {
+                words.push(0x8000 | block as u32);
+                block += 1;
+            } else {
+                words.push(slot(arrangement.forest.parent[n as usize]));
+            }
+            triangles += arrangement.brought(n).len() as u32;
+            words.push(triangles);
+        }
+        for &top in tops {
+            match arrangement.forest.parent[top as usize] {
+                NONE => words.extend([NONE, NONE]),
+                above => words.extend([blocking.number[above as usize].0, above]),
+            }
+        }
+        for &link in &links {
+            words.extend([blocking.number[link as usize].0, link]);
+            words.extend(page::bounds_words(&arrangement.log.collapses[link as usize].bounds));
+        }
+        for &n in &nodes {
+            let Span { first, end, .. } = arrangement.spans[n as usize];
+            for &(mut corners) in arrangement.brought(n) {
+                // Two corners are below the node, one on each side; the other comes first.
+                let far = corners.iter().position(|leaf| !(first..end).contains(leaf)).unwrap_or(0);
+                corners.rotate_left(far);
+                words.extend(corners);
+            }
+        }
+        words[1..page::HEADER_WORDS].copy_from_slice(&[
+            page,
+            nodes_of.parent,
+            nodes.len() as u32,
+            tops.len() as u32,
+            links.len() as u32,
+            triangles,
+            nodes_of.children.start,
+            nodes_of.children.len() as u32,
+        ]);
+        words[0] = page::checksum(words);
+    }
+}
