@@ -186,7 +186,6 @@ impl<T: VertexTree, M: MeshSink> Objects<T, M> {
             forced: 0,
             carried: 0,
             blocked: 0,
-            carried: 0,
             misses: 0,
             active_nodes: 0,
             triangles: 0,
@@ -225,7 +224,6 @@ fn add(all: &mut FrameReport, report: &FrameReport, number: u64) {
     all.forced += report.forced;
     all.carried += report.carried;
     all.blocked += report.blocked;
-    all.carried += report.carried;
     all.misses += report.misses;
     all.active_nodes += report.active_nodes;
     all.triangles += report.triangles;
