@@ -27,9 +27,7 @@ const LINES: u32 = 1080;
 const SOFT: f64 = 0.1;
 
 fn build(quantize: bool, nest_needs: bool) -> BuildOptions {
-    let mut options = BuildOptions::default();
-    (options.quantize, options.nest_needs) = (quantize, nest_needs);
-    options
+    BuildOptions { quantize, nest_needs, ..BuildOptions::default() }
 }
 
 /// The mesh of a name, and a path along it.
@@ -88,9 +86,11 @@ fn engine<M: MeshSink>(
     strategy: Strategy,
     soft: f64,
 ) -> Engine<XfmTree, M> {
-    let mut paging = detail_block::Settings::default();
-    paging.loading = Loading::Blocking;
-    paging.soft_quota = (soft * file.resident_bytes_of_all() as f64) as u64;
+    let paging = detail_block::Settings {
+        loading: Loading::Blocking,
+        soft_quota: (soft * file.resident_bytes_of_all() as f64) as u64,
+        ..detail_block::Settings::default()
+    };
     let usual = path.motion_percentile(99.0);
     let settings = Settings { strategy, rho: usual.rho, omega: usual.omega, ..Settings::default() };
     let tree = XfmTree::new(file.clone(), paging).expect("no thread is started");
@@ -196,7 +196,7 @@ fn displacement(log: &CollapseLog, quantised: &CollapseLog, path: &Path) -> f64 
 
 /// Figure 10: the tolerance follows a frame time.
 fn steered(name: &str, file: &Arc<XfmFile>, path: &Path) {
-    for target in [Duration::from_micros(500), Duration::from_millis(2)] {
+    for target in [Duration::from_micros(100), Duration::from_micros(500)] {
         let mut engine = engine(file, ActiveMesh::new(), path, Strategy::Event, SOFT);
         engine.set_budget(Budget::FrameTime(target));
         let mut times = Vec::new();
