@@ -26,7 +26,7 @@
 
 use vertex_tree::Bounds;
 
-use crate::motion::Course;
+use crate::motion::{Course, Speed};
 use crate::view::View;
 
 /// What "coarse" means: the second half of the refinement criterion.
@@ -76,7 +76,11 @@ impl Criterion {
     #[inline]
     #[must_use]
     pub fn unfold(self, views: &[View], bounds: &Bounds) -> bool {
-        views.iter().any(|view| self.unfold_for(view, bounds))
+        // One view is the rule, and worth a test without a loop around it.
+        match views {
+            [view] => self.unfold_for(view, bounds),
+            _ => views.iter().any(|view| self.unfold_for(view, bounds)),
+        }
     }
 
     /// Whether one view wants the node unfolded.
@@ -106,6 +110,27 @@ impl Criterion {
         // f <= r, with the root on one side: p cos beta <= r + a sin beta.
         let bound = r + a * view.sin_beta;
         bound >= 0.0 && p2 * (view.cos_beta * view.cos_beta) <= bound * bound
+    }
+
+    /// How large the error of a node is in the view that wants it most, in terms of the tolerance: at least 1 where one
+    /// wants it, infinite where an eye is in the sphere. For a node that no view wants, below 1, and 0 where it is out of
+    /// view. By screen error, a parent is never less urgent than its children.
+    #[must_use]
+    pub fn urgency(self, views: &[View], bounds: &Bounds) -> f64 {
+        let urgency = |view: &View| {
+            let s =
+                Situation::new(self, view, &Course::from(Speed { rho: 0.0, omega: 0.0, kappa: 0.0 }), bounds);
+            let (error, distance) = match self {
+                Self::ScreenError => (s.reach - s.r, s.d - s.r),
+                Self::SphereSize => (s.reach, s.d),
+            };
+            match (s.d < s.r, s.gap <= 0.0) {
+                (true, _) => f64::INFINITY,
+                (_, true) => error / distance.max(f64::MIN_POSITIVE),
+                (_, false) => 0.0,
+            }
+        };
+        views.iter().map(urgency).fold(0.0, f64::max)
     }
 
     /// For a folded node, how many frames on a course must pass before any view can want it unfolded; 0 if that can not

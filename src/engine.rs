@@ -7,11 +7,12 @@
 //!
 //! Everything here runs on the caller's thread. A backend may have threads of its own; no call waits for them.
 
+use std::collections::BinaryHeap;
 use std::time::{Duration, Instant};
 
 use vertex_tree::{MeshSink, NodeId, PageStats, Step, TreeError, VertexTree};
 
-use crate::budget::{Budget, Steering};
+use crate::budget::{Budget, FOLDING_SHARE, Steering, WorkCap};
 use crate::criterion::Criterion;
 use crate::front::{Front, Slot};
 use crate::motion::{Odometer, Speed};
@@ -32,6 +33,8 @@ pub struct Settings {
     pub omega: f64,
     /// What a frame may cost.
     pub budget: Budget,
+    /// What a frame may do.
+    pub work_cap: WorkCap,
 }
 
 impl Default for Settings {
@@ -43,6 +46,7 @@ impl Default for Settings {
             rho: 1.0,
             omega: 0.02,
             budget: Budget::None,
+            work_cap: WorkCap::None,
         }
     }
 }
@@ -58,6 +62,8 @@ pub enum Limit {
     Time,
     /// Pages that were not in memory.
     Io,
+    /// The cap on a frame's work.
+    Work,
 }
 
 impl Limit {
@@ -69,6 +75,7 @@ impl Limit {
             Self::Triangles => "triangles",
             Self::Time => "time",
             Self::Io => "io",
+            Self::Work => "work",
         }
     }
 }
@@ -88,6 +95,8 @@ pub struct FrameReport {
     pub folds: u64,
     /// Those of the unfolds that no view wanted: another node needed them.
     pub forced: u64,
+    /// Wanted changes left to later frames by the cap on work.
+    pub carried: u64,
     /// Wanted changes that a rule of the backend's own forbade, see [`Step::Blocked`].
     pub blocked: u64,
     /// Wanted changes that the backend refused for want of a page.
@@ -135,6 +144,16 @@ struct Counts {
     unfolds: u64,
     folds: u64,
     forced: u64,
+    carried: u64,
+}
+
+/// A change that waits for its turn where work is capped. The most urgent one is the greatest.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
+struct Urgent {
+    /// Bits of a number that is not negative, which are in the same order.
+    urgency: u64,
+    slot: Slot,
+    node: NodeId,
 }
 
 /// A front through a hierarchy of backend `T`, reporting the displayed mesh to `M`.
@@ -158,6 +177,7 @@ pub struct Engine<T, M> {
     still_needed: Vec<Noted>,
     folding: Vec<Noted>,
     unfolding: Vec<Noted>,
+    urgent: [BinaryHeap<Urgent>; 2],
     arrived: Vec<NodeId>,
     drawing_time: Duration,
 }
@@ -200,6 +220,7 @@ impl<T: VertexTree, M: MeshSink> Engine<T, M> {
             still_needed: Vec::new(),
             folding: Vec::new(),
             unfolding: Vec::new(),
+            urgent: Default::default(),
             arrived: Vec::new(),
             drawing_time: Duration::ZERO,
         })
@@ -210,7 +231,8 @@ impl<T: VertexTree, M: MeshSink> Engine<T, M> {
         &self.tree
     }
 
-    /// The backend, to change between two frames what it is allowed, or to [wait](VertexTree::settle) for its pages.
+    /// The backend, to wait for its pages or to change what it may use. Folding or unfolding behind the engine's back
+    /// breaks the front.
     pub fn tree_mut(&mut self) -> &mut T {
         &mut self.tree
     }
@@ -244,6 +266,11 @@ impl<T: VertexTree, M: MeshSink> Engine<T, M> {
     pub fn set_budget(&mut self, budget: Budget) {
         self.settings.budget = budget;
         self.steering.set_budget(budget);
+    }
+
+    /// Sets another cap on a frame's work from the next frame on.
+    pub fn set_work_cap(&mut self, work_cap: WorkCap) {
+        self.settings.work_cap = work_cap;
     }
 
     /// Adds what drawing took to the frame time that the next [`advance`](Self::advance) steers by.
@@ -311,7 +338,10 @@ impl<T: VertexTree, M: MeshSink> Engine<T, M> {
         step.forbidden.clear();
         note(step.front, &self.flips.fold, step.folding);
         note(step.front, &self.flips.unfold, step.unfolding);
-        let applied = step.apply();
+        let applied = match self.settings.work_cap {
+            WorkCap::None => step.apply(),
+            cap => step.apply_within(cap, found, &mut self.urgent),
+        };
         if applied.is_err() {
             step.abandon();
         }
@@ -331,6 +361,7 @@ impl<T: VertexTree, M: MeshSink> Engine<T, M> {
         let triangles = self.tree.displayed_triangles();
         let limit = match self.steering.budget() {
             _ if misses > 0 => Limit::Io,
+            _ if counts.carried > 0 => Limit::Work,
             Budget::Triangles(_) if self.steering.limits() => Limit::Triangles,
             Budget::FrameTime(_) if self.steering.limits() => Limit::Time,
             _ => Limit::Error,
@@ -345,6 +376,7 @@ impl<T: VertexTree, M: MeshSink> Engine<T, M> {
             unfolds: counts.unfolds,
             folds: counts.folds,
             forced: counts.forced,
+            carried: counts.carried,
             blocked,
             misses,
             active_nodes: self.front.active_nodes() as u64,
@@ -389,7 +421,7 @@ struct Steps<'a, T, M> {
 impl<T: VertexTree, M: MeshSink> Steps<'_, T, M> {
     /// Folds, then unfolds, and whatever follows.
     fn apply(&mut self) -> Result<(), TreeError> {
-        self.take_turns(|steps| &mut *steps.folding, Self::fold)?;
+        self.take_turns(Kind::Fold)?;
         // What a rule forbade when its turn came may have become possible since: to a fixpoint, so that the order in which
         // a strategy finds changes does not matter.
         let mut before = None;
@@ -397,25 +429,34 @@ impl<T: VertexTree, M: MeshSink> Steps<'_, T, M> {
             before = Some(self.counts.folds);
             self.folding.clear();
             self.folding.append(self.blocked);
-            self.take_turns(|steps| &mut *steps.folding, Self::fold)?;
+            self.take_turns(Kind::Fold)?;
         }
-        self.forbidden.extend(self.blocked.drain(..).map(|(_, node)| node));
-        self.take_turns(|steps| &mut *steps.unfolding, Self::unfold)?;
+        self.forbid();
+        self.take_turns(Kind::Unfold)?;
         let mut before = None;
         while !self.blocked.is_empty() && before != Some(self.counts.unfolds) {
             before = Some(self.counts.unfolds);
             self.unfolding.clear();
             self.unfolding.append(self.blocked);
-            self.take_turns(|steps| &mut *steps.unfolding, Self::unfold)?;
+            self.take_turns(Kind::Unfold)?;
         }
+        self.let_go()
+    }
+
+    /// What is blocked now stays so in this frame.
+    fn forbid(&mut self) {
         self.forbidden.extend(self.blocked.drain(..).map(|(_, node)| node));
-        // What was needed when its turn came may have been let go since.
+    }
+
+    /// What was needed when its turn came may have been let go since.
+    fn let_go(&mut self) -> Result<(), TreeError> {
+        self.forbid();
         let mut before = None;
         while !self.still_needed.is_empty() && before != Some(self.counts.folds) {
             before = Some(self.counts.folds);
             self.folding.clear();
             self.folding.append(self.still_needed);
-            self.take_turns(|steps| &mut *steps.folding, Self::fold)?;
+            self.take_turns(Kind::Fold)?;
             let front = &*self.front;
             self.still_needed.sort_unstable();
             self.still_needed.dedup();
@@ -425,6 +466,58 @@ impl<T: VertexTree, M: MeshSink> Steps<'_, T, M> {
             self.refused(slot, Kind::Fold);
         }
         Ok(())
+    }
+
+    /// The same within a cap, most urgent first. `start` is when the work began.
+    fn apply_within(
+        &mut self,
+        cap: WorkCap,
+        start: Instant,
+        [folds, unfolds]: &mut [BinaryHeap<Urgent>; 2],
+    ) -> Result<(), TreeError> {
+        let is_spent = |counts: &Counts, share: f64| match cap {
+            WorkCap::None => false,
+            WorkCap::Changes(most) => (counts.folds + counts.unfolds) as f64 >= most as f64 * share,
+            WorkCap::Time(most) => start.elapsed() >= most.mul_f64(share),
+        };
+        let mut result = Ok(());
+        // Folds that must not wait, unfolds, and folds again with what is left.
+        for (kind, share) in [(Kind::Fold, FOLDING_SHARE), (Kind::Unfold, 1.0), (Kind::Fold, 1.0)] {
+            let heap = if kind == Kind::Fold { &mut *folds } else { &mut *unfolds };
+            loop {
+                // At first all that was found, later what follows from a change.
+                self.await_turn(kind, heap);
+                if result.is_err() || is_spent(&self.counts, share) {
+                    break;
+                }
+                let Some(Urgent { slot, node, .. }) = heap.pop() else { break };
+                result = match kind {
+                    Kind::Fold => self.fold((slot, node)),
+                    Kind::Unfold => self.unfold((slot, node)),
+                };
+            }
+        }
+        for (kind, heap) in [(Kind::Fold, folds), (Kind::Unfold, unfolds)] {
+            for Urgent { slot, node, .. } in heap.drain() {
+                let is_still = if kind == Kind::Fold { is_collapsible } else { is_boundary };
+                if is_still(self.front, (slot, node)) {
+                    self.counts.carried += 1;
+                    self.refused(slot, kind);
+                }
+            }
+        }
+        result.and_then(|()| self.let_go())
+    }
+
+    /// Moves the changes found so far to a heap.
+    fn await_turn(&mut self, kind: Kind, heap: &mut BinaryHeap<Urgent>) {
+        let list = if kind == Kind::Fold { &mut *self.folding } else { &mut *self.unfolding };
+        heap.extend(list.drain(..).map(|(slot, node)| {
+            let urgency = self.frame.criterion.urgency(self.frame.views, &self.front.record(slot).bounds);
+            // Of what is to be folded, the least wanted first.
+            let urgency = if kind == Kind::Fold { 1.0 - urgency.min(1.0) } else { urgency };
+            Urgent { urgency: urgency.max(0.0).to_bits(), slot, node }
+        }));
     }
 
     /// The backend can not go on: whatever was to change is to be looked at again when it can.
@@ -445,41 +538,40 @@ impl<T: VertexTree, M: MeshSink> Steps<'_, T, M> {
     /// Changes the nodes of a list, which may grow meanwhile. While some change, those whose turn comes next are prepared,
     /// the further off the less.
     #[inline(always)]
-    fn take_turns(
-        &mut self,
-        list: impl Fn(&mut Self) -> &mut Vec<Noted>,
-        change: impl Fn(&mut Self, Noted) -> Result<(), TreeError>,
-    ) -> Result<(), TreeError> {
-        let mut noted = std::mem::take(list(self));
+    fn take_turns(&mut self, kind: Kind) -> Result<(), TreeError> {
         let mut prepared = [0; MOST_STEPS];
         let steps = T::PREPARATION.clamp(1, MOST_STEPS);
         let mut done = 0;
-        let mut result = Ok(());
-        while done < noted.len() && result.is_ok() {
+        while done < self.list(kind).len() {
             for (step, prepared) in prepared[..steps].iter_mut().enumerate() {
-                let end = noted.len().min(done + TOGETHER * (steps - step));
-                for &(slot, node) in &noted[*prepared..end] {
-                    match step {
-                        0 => {
-                            self.front.prefetch_linked(slot);
-                            self.finder.prefetch(slot);
-                            self.tree.prepare(node, 0, self.mesh);
-                        }
-                        _ => self.tree.prepare(node, step, self.mesh),
+                let end = self.list(kind).len().min(done + TOGETHER * (steps - step));
+                for &(slot, node) in &self.list(kind)[*prepared..end] {
+                    if step == 0 {
+                        self.front.prefetch_linked(slot);
+                        self.finder.prefetch(slot);
                     }
+                    self.tree.prepare(node, step, self.mesh);
                 }
                 *prepared = end;
             }
-            let end = noted.len().min(done + TOGETHER);
-            while done < end && result.is_ok() {
-                result = change(self, noted[done]);
-                done += 1;
+            let end = self.list(kind).len().min(done + TOGETHER);
+            for at in done..end {
+                match kind {
+                    Kind::Fold => self.fold(self.folding[at])?,
+                    Kind::Unfold => self.unfold(self.unfolding[at])?,
+                }
             }
-            // What follows from these changes.
-            noted.append(list(self));
+            done = end;
         }
-        *list(self) = noted;
-        result
+        Ok(())
+    }
+
+    #[inline(always)]
+    fn list(&self, kind: Kind) -> &Vec<Noted> {
+        match kind {
+            Kind::Fold => self.folding,
+            Kind::Unfold => self.unfolding,
+        }
     }
 
     fn wanted(&mut self, slot: Slot) -> bool {
@@ -541,8 +633,25 @@ impl<T: VertexTree, M: MeshSink> Steps<'_, T, M> {
 
     /// Unfolds a boundary node that some view wants, and before it what the backend says it needs. Children that are
     /// wanted too follow.
-    fn unfold(&mut self, noted: Noted) -> Result<(), TreeError> {
-        self.stack.push(Pending::wanted(noted));
+    #[inline(always)]
+    fn unfold(&mut self, (slot, node): Noted) -> Result<(), TreeError> {
+        if !is_boundary(self.front, (slot, node)) {
+            return Ok(());
+        }
+        match self.tree.unfold(node, self.mesh)? {
+            Step::Done => self.unfolded(slot),
+            step => {
+                self.stack.push(Pending::wanted((slot, node)));
+                self.wait_or_give_up((slot, node), step);
+                self.unfold_needed()?;
+            }
+        }
+        Ok(())
+    }
+
+    /// Unfolds what waits on the stack, from the top.
+    #[cold]
+    fn unfold_needed(&mut self) -> Result<(), TreeError> {
         while let Some(&Pending { slot, node, needed, .. }) = self.stack.last() {
             let slot = if slot == Slot::NONE { self.front.find(self.tree, node) } else { slot };
             if self.front.node(slot) == node && self.front.record(slot).is_active() {
@@ -563,51 +672,58 @@ impl<T: VertexTree, M: MeshSink> Steps<'_, T, M> {
                 continue;
             }
             match self.tree.unfold(node, self.mesh)? {
-                Step::Done => {}
-                Step::Needs(other) if !self.is_active(other) && !self.waits(other) => {
-                    if let Some(pending) = self.stack.last_mut() {
-                        pending.waits = true;
+                Step::Done => {
+                    self.stack.pop();
+                    if needed && !self.wanted(slot) {
+                        self.counts.forced += 1;
                     }
-                    self.stack.push(Pending::needed(other));
-                    continue;
+                    self.unfolded(slot);
                 }
-                Step::Blocked => {
-                    self.blocked.push((slot, node));
-                    self.give_up();
-                    continue;
-                }
-                Step::Needs(_) | Step::NotResident | Step::StillNeeded => {
-                    self.missing.push(node);
-                    self.give_up();
-                    continue;
-                }
-            }
-            self.stack.pop();
-            self.counts.unfolds += 1;
-            if needed && !self.wanted(slot) {
-                self.counts.forced += 1;
-            }
-            self.finder.unwatch(slot);
-            for parent in self.front.parents(self.tree, slot) {
-                if self.front.record(parent).is_collapsible() {
-                    self.finder.unwatch(parent);
-                }
-            }
-            self.front.set_active(self.tree, slot);
-            self.watch(slot, Kind::Fold);
-            for child in self.front.children(self.tree, slot) {
-                let record = self.front.record(child);
-                if T::IS_TREE || record.is_boundary() {
-                    self.tests += 1;
-                    if self.frame.unfold(&record.bounds) {
-                        self.unfolding.push((child, record.node));
-                    } else {
-                        self.finder.watch(self.frame, child, Kind::Unfold, record.bounds);
-                    }
-                }
+                step => self.wait_or_give_up((slot, node), step),
             }
         }
         Ok(())
+    }
+
+    /// The node on top of the stack has not been unfolded: what it needs goes on top of it, or it is left for later.
+    fn wait_or_give_up(&mut self, (slot, node): Noted, step: Step) {
+        match step {
+            Step::Needs(other) if !self.is_active(other) && !self.waits(other) => {
+                if let Some(pending) = self.stack.last_mut() {
+                    pending.waits = true;
+                }
+                self.stack.push(Pending::needed(other));
+                return;
+            }
+            Step::Blocked => self.blocked.push((slot, node)),
+            Step::Done | Step::Needs(_) | Step::NotResident | Step::StillNeeded => self.missing.push(node),
+        }
+        self.give_up();
+    }
+
+    /// The backend has unfolded a node.
+    #[inline(always)]
+    fn unfolded(&mut self, slot: Slot) {
+        self.counts.unfolds += 1;
+        self.finder.unwatch(slot);
+        for parent in self.front.parents(self.tree, slot) {
+            if self.front.record(parent).is_collapsible() {
+                self.finder.unwatch(parent);
+            }
+        }
+        self.front.set_active(self.tree, slot);
+        self.watch(slot, Kind::Fold);
+        for child in self.front.children(self.tree, slot) {
+            let record = self.front.record(child);
+            if T::IS_TREE || record.is_boundary() {
+                self.tests += 1;
+                if self.frame.unfold(&record.bounds) {
+                    self.unfolding.push((child, record.node));
+                } else {
+                    self.finder.watch(self.frame, child, Kind::Unfold, record.bounds);
+                }
+            }
+        }
     }
 
     fn is_active(&self, node: NodeId) -> bool {

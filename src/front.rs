@@ -201,6 +201,17 @@ impl Front {
         }
     }
 
+    /// Appends the pairs of the nodes linked below a node to `below`. One pair is the rule, and not worth a call.
+    #[inline(always)]
+    pub(crate) fn descend(&self, record: &Record, below: &mut Vec<u32>) {
+        if record.children == 0 {
+        } else if record.status & MANY == 0 {
+            below.push(record.children);
+        } else {
+            below.extend_from_slice(self.below(record));
+        }
+    }
+
     /// The nodes in play in some pairs.
     fn slots_in<'a>(&'a self, pairs: &'a [u32]) -> impl Iterator<Item = Slot> + 'a {
         let slots = pairs.iter().flat_map(|&pair| [Slot(2 * pair), Slot(2 * pair + 1)]);
@@ -393,7 +404,7 @@ impl Front {
             for record in self.pair(pair) {
                 if record.is_active() {
                     f(record.node);
-                    stack.extend_from_slice(self.below(record));
+                    self.descend(record, &mut stack);
                 }
             }
         }

@@ -74,6 +74,7 @@ pub mod front;
 mod frustum;
 pub mod mesh_io;
 pub mod motion;
+pub mod objects;
 pub mod oracle;
 mod packed;
 mod parallel;
@@ -90,9 +91,13 @@ pub mod scene;
 pub mod simplify;
 pub mod view;
 
+#[cfg(feature = "detail-block")]
+pub use detail_block;
 pub use glam;
 #[cfg(feature = "in-memory")]
 pub use in_memory;
+#[cfg(feature = "mt-partition")]
+pub use mt_partition;
 pub use vertex_tree;
 pub use vertex_tree::output;
 pub use vertex_tree::{Bounds, Collapse, CollapseLog, Mesh, NodeId, VertexTree};

@@ -27,21 +27,21 @@ impl TopDown {
         self.stack.clear();
         self.stack.extend_from_slice(front.root_pairs());
         while let Some(pair) = self.stack.pop() {
-            for (record, slot) in front.pair(pair).iter().zip([2 * pair, 2 * pair + 1].map(Slot)) {
+            for (side, record) in (0..).zip(front.pair(pair)) {
                 if record.node.0 == NONE {
                     continue;
                 }
                 flips.tests += 1;
-                self.stack.extend_from_slice(front.below(record));
+                front.descend(record, &mut self.stack);
                 let (wanted, active) = (unfold(&record.bounds), record.is_active());
                 if wanted != active {
                     if wanted {
                         if record.is_boundary() {
-                            flips.unfold.push(slot);
+                            flips.unfold.push(Slot(2 * pair + side));
                         }
                     } else if record.is_collapsible() {
                         // The rest of a subtree that has to go follows from its lowest nodes upwards.
-                        flips.fold.push(slot);
+                        flips.fold.push(Slot(2 * pair + side));
                     }
                 }
             }

@@ -1,0 +1,45 @@
+//! Cones of normals: an axis and how far normals turn away from it.
+//!
+//! Angles are kept as cosine and sine, so that they are added and compared without trigonometry. From 90 degrees on a cone
+//! says nothing about which side is seen.
+
+use crate::node::NO_CONE;
+use crate::vector::{self, Vector};
+
+/// An angle below 90 degrees; `None` for all others.
+pub(crate) type Angle = Option<(f64, f64)>;
+
+pub(crate) const ZERO: Angle = Some((1.0, 0.0));
+
+/// The angle between two unit vectors.
+pub(crate) fn between(a: Vector, b: Vector) -> Angle {
+    let cosine = vector::dot(a, b);
+    (cosine > 0.0).then(|| (cosine.min(1.0), vector::length(vector::cross(a, b)).min(1.0)))
+}
+
+/// The sum of two angles.
+pub(crate) fn sum(a: Angle, b: Angle) -> Angle {
+    let ((c, s), (d, t)) = (a?, b?);
+    let cosine = c * d - s * t;
+    (cosine > 0.0).then_some((cosine, (s * d + c * t).min(1.0)))
+}
+
+/// The larger of two angles.
+pub(crate) fn larger(a: Angle, b: Angle) -> Angle {
+    let (a, b) = (a?, b?);
+    Some(if a.0 <= b.0 { a } else { b })
+}
+
+/// The sine to be stored for an angle, with room for rounding: never too small.
+pub(crate) fn stored_sine(angle: Angle) -> f32 {
+    match angle {
+        Some((cosine, sine)) if cosine > 1e-3 => ((sine + 1e-6) as f32).next_up().min(1.0),
+        _ => NO_CONE,
+    }
+}
+
+/// The angle of a stored sine.
+pub(crate) fn of_sine(sine: f32) -> Angle {
+    let sine = f64::from(sine);
+    (sine < 1.0).then(|| ((1.0 - sine * sine).sqrt(), sine))
+}

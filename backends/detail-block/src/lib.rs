@@ -1,0 +1,58 @@
+//! XFastMesh: half-edge collapses in detail blocks, paged from disk.
+//!
+//! After DeCoro & Pajarola, XFastMesh: Fast View-dependent Meshing from External Memory, 2002.
+//!
+//! ```
+//! # use std::sync::Arc;
+//! # use detail_block::{BuildOptions, Settings, XfmFile, XfmTree};
+//! # use vertex_tree::source::FileSource;
+//! # use vertex_tree::{CollapseLog, NullSink, VertexTree};
+//! # fn main() -> Result<(), Box<dyn std::error::Error>> {
+//! # let (log, folder) = (CollapseLog::default(), tempfile::tempdir()?);
+//! # let path = &folder.path().join("empty.xfm");
+//! detail_block::write(path, &log, &BuildOptions::default())?; // once a model
+//! let file = Arc::new(XfmFile::open(Arc::new(FileSource::open(path)?))?); // once a process
+//! let mut tree = XfmTree::new(file, Settings::default())?; // once a viewer
+//! tree.base_mesh(&mut NullSink)?;
+//! # Ok(())
+//! # }
+//! ```
+//!
+//! The merge-tree forest is cut into complete subtrees of a few levels, the detail blocks, which are packed in the file and
+//! loaded one by one (the file: `format`; numbers: `numbering`; building: [`write()`]). The displayed mesh is one of directed
+//! half-edges that vertex splits and half-edge collapses change ([`XfmTree`]). A block stays in memory while something in it
+//! is active, and goes when quotas say so, the least recently used first.
+
+mod block;
+mod build;
+mod cone;
+mod error;
+mod file;
+mod format;
+mod half_edges;
+mod header;
+mod layout;
+mod loader;
+mod nesting;
+mod node;
+mod numbering;
+mod paging;
+mod quantize;
+mod removal;
+mod replay;
+mod settings;
+mod shown;
+mod split_apart;
+mod tree;
+mod vector;
+mod verify;
+mod well_formed;
+mod writing;
+
+pub use build::{Arrangement, BuildOptions, WriteReport, write};
+pub use error::XfmError;
+pub use file::XfmFile;
+pub use format::MAGIC;
+pub use paging::{ATTEMPTS, PagingCounts, SOON};
+pub use settings::{Loading, Settings};
+pub use tree::XfmTree;

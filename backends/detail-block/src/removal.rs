@@ -1,0 +1,124 @@
+//! Removal of blocks: candidates, the queue of them, and the two quotas (section 4.2 of the paper).
+
+use vertex_tree::{NONE, NodeId, PageStats};
+
+use crate::block::resident_bytes;
+use crate::paging::{Paging, SOON, Stub};
+
+impl Paging {
+    /// A block may have become a candidate for removal.
+    pub fn may_go(&mut self, number: u32) {
+        if self.is_candidate(number) {
+            let frame = self.frame;
+            if let Some(block) = self.block_mut(number) {
+                block.stamp = frame;
+            }
+            let which = usize::from(self.is_in_play(number));
+            self.candidates[which].push_back((frame, number));
+        }
+    }
+
+    /// The block of the sibling of a block's root, if there is one and the block above is loaded.
+    pub fn sibling(&self, number: u32) -> Option<u32> {
+        let parent = self.block(number)?.parent;
+        if parent == NONE {
+            return None;
+        }
+        self.child_blocks(NodeId(parent))?.find(|&other| other != number)
+    }
+
+    fn is_candidate(&self, number: u32) -> bool {
+        let is_folded = |number| self.block(number).is_none_or(|block| block.active == 0);
+        self.block(number).is_some() && is_folded(number) && self.sibling(number).is_none_or(is_folded)
+    }
+
+    /// Whether the root of a block hangs below an active node: it may be unfolded next.
+    fn is_in_play(&self, number: u32) -> bool {
+        let parent = self.block(number).map_or(NONE, |block| block.parent);
+        parent != NONE && self.is_active(NodeId(parent))
+    }
+
+    /// Of the candidates that are out of play, or of those in play, the one that was used least recently, taken out of its
+    /// queue, if nothing has used it since a frame.
+    fn next_candidate(&mut self, in_play: bool, unused_since: u64) -> Option<u32> {
+        let which = usize::from(in_play);
+        while let Some(&(stamp, number)) = self.candidates[which].front() {
+            let is_current = self.block(number).is_some_and(|block| block.stamp == stamp);
+            // Stamps ascend: those behind are no older.
+            if is_current && stamp >= unused_since {
+                return None;
+            }
+            self.candidates[which].pop_front();
+            if !is_current || !self.is_candidate(number) {
+                continue;
+            }
+            let is_unused = self.block(number).is_some_and(|block| block.used < unused_since);
+            if is_unused && self.is_in_play(number) == in_play {
+                return Some(number);
+            }
+            self.may_go(number);
+        }
+        None
+    }
+
+    /// A candidate to make room below the hard quota: one in play if there is no other.
+    fn any_candidate(&mut self) -> Option<u32> {
+        self.next_candidate(false, self.frame).or_else(|| self.next_candidate(true, self.frame))
+    }
+
+    fn remove(&mut self, number: u32) {
+        let slot = std::mem::replace(&mut self.directory[number as usize], NONE);
+        let block = self.loaded.remove(slot as usize);
+        self.bytes -= resident_bytes(block.nodes.len() as u32);
+        if block.parent != NONE && self.is_active(NodeId(block.parent)) {
+            let stub = Stub { bounds: block.nodes[0].stored.bounds(), parent: block.parent };
+            self.stubs.insert(number, stub);
+        }
+        self.counts.removals += 1;
+        self.removed_at.insert(number, self.frame);
+        self.removed.push_back((self.frame, number));
+    }
+
+    /// A node has been folded: its children are not in play any more.
+    pub fn leave_play(&mut self, node: NodeId) {
+        for number in self.child_blocks(node).unwrap_or_default() {
+            self.stubs.remove(&number);
+            self.may_go(number);
+        }
+    }
+
+    /// Makes room for so many bytes below the hard quota.
+    pub fn make_room(&mut self, bytes: u64) -> bool {
+        while (self.bytes + self.reserved).saturating_add(bytes) > self.hard {
+            match self.any_candidate() {
+                Some(number) => self.remove(number),
+                None => return false,
+            }
+        }
+        true
+    }
+
+    /// Removes candidates beyond the quotas.
+    pub fn end_frame(&mut self) -> PageStats {
+        while self.bytes + self.reserved > self.hard
+            && let Some(number) = self.any_candidate()
+        {
+            self.remove(number);
+        }
+        while self.bytes > self.soft
+            && let Some(number) = self.next_candidate(false, self.frame.saturating_sub(self.grace))
+        {
+            self.remove(number);
+        }
+        while let Some(&(at, number)) = self.removed.front()
+            && at + SOON < self.frame
+        {
+            self.removed.pop_front();
+            if self.removed_at.get(&number) == Some(&at) {
+                self.removed_at.remove(&number);
+            }
+        }
+        let resident_bytes = self.bytes + self.file.fixed_bytes() + 4 * self.directory.len() as u64;
+        PageStats { resident_bytes, ..std::mem::take(&mut self.stats) }
+    }
+}

@@ -1,0 +1,170 @@
+//! Checks a whole file: every block, every reference, nesting, and that needs never go in a circle.
+//!
+//! Takes memory for some 44 bytes a node.
+
+use vertex_tree::{Bounds, NONE, NodeId};
+
+use crate::error::XfmError;
+use crate::file::XfmFile;
+use crate::half_edges::Adjacent;
+use crate::numbering::{Owner, owner};
+
+/// Half of the relative slack that building leaves between nested spheres.
+const SLACK: f64 = 1.0 / (1 << 21) as f64;
+
+/// What is kept of every node: bounds, w x y z as nodes, and whether it has the two triangles.
+struct Kept {
+    bounds: Vec<Bounds>,
+    above: Vec<[u32; 5]>,
+    sides: Vec<[bool; 2]>,
+    flags: Vec<u32>,
+}
+
+impl XfmFile {
+    /// Reads every block and checks every reference in the file.
+    ///
+    /// # Errors
+    /// The first thing that is wrong.
+    pub fn verify(&self) -> Result<(), XfmError> {
+        let header = self.header();
+        let (levels, nodes) = (header.levels, header.nodes as usize);
+        let mut kept = Kept {
+            bounds: Vec::with_capacity(nodes),
+            above: Vec::with_capacity(nodes),
+            sides: Vec::with_capacity(nodes),
+            flags: Vec::with_capacity(header.blocks as usize),
+        };
+        let mut half_edges = Vec::with_capacity(nodes);
+        // What is above each block, as its parent's block says.
+        let mut named = vec![NONE; header.blocks as usize];
+        let mut bytes = Vec::new();
+        let mut triangles = header.initial_faces;
+        for number in 0..header.blocks as u32 {
+            let block = self.read_block(number, &mut bytes)?;
+            let root = levels.node(number, 0);
+            let listed = self.roots().binary_search_by_key(&root, |&(root, _)| root).ok();
+            if block.parent != named[number as usize] || listed.is_some() != (block.parent == NONE) {
+                return Err(self.damaged(number, "root list, parent and child blocks do not agree"));
+            }
+            if listed.is_some_and(|i| self.roots()[i].1 != block.nodes[0].stored.bounds()) {
+                return Err(self.damaged(number, "the root list has another sphere"));
+            }
+            for place in 0..levels.fan_out() {
+                if let Some(child) = block.child_block(place) {
+                    if named[child as usize] != NONE {
+                        return Err(self.damaged(number, "a child block has two parents"));
+                    }
+                    named[child as usize] = levels.node(number, levels.lowest() + place / 2).0;
+                }
+            }
+            for (offset, index) in (0..levels.full()).filter_map(|o| Some((o, block.index_of(o)?))) {
+                let node = &block.nodes[index].stored;
+                let [w, x, y, z] = node.adjacent;
+                let sides = Adjacent { w, x, y, z }.sides();
+                triangles += sides.iter().map(|&side| u64::from(side)).sum::<u64>();
+                kept.bounds.push(node.bounds());
+                kept.sides.push(sides);
+                half_edges.push(node.adjacent);
+                let parent = match offset {
+                    0 => block.parent,
+                    _ => levels.node(number, (offset - 1) / 2).0,
+                };
+                kept.above.push([parent, NONE, NONE, NONE, NONE]);
+            }
+            kept.flags.push(block.flags);
+        }
+        if triangles != header.triangles {
+            return Err(XfmError::Field {
+                file: self.name().to_owned(),
+                offset: 64,
+                field: "the number of triangles",
+                value: header.triangles,
+                expected: "but initial faces and nodes bring others",
+            });
+        }
+        self.check_references(&mut kept, &half_edges)?;
+        self.check_order(&kept)
+    }
+
+    /// The place of a node among all, if it is there.
+    fn ordinal(&self, flags: &[u32], node: NodeId) -> Option<usize> {
+        let (block, offset) = (self.levels().block(node), self.levels().offset(node));
+        let flags = *flags.get(block as usize)?;
+        let before = (flags & ((1 << offset) - 1)).count_ones();
+        (flags & 1 << offset != 0).then(|| (self.nodes_before(block) + before) as usize)
+    }
+
+    fn wrong(&self, ordinal: usize, reason: &'static str) -> XfmError {
+        let blocks = 0..self.header().blocks as u32;
+        let block = blocks.rev().find(|&block| self.nodes_before(block) as usize <= ordinal).unwrap_or(0);
+        let node = self.levels().node(block, 0).0;
+        XfmError::Node { file: self.name().to_owned(), offset: self.place(block).0, node, reason }
+    }
+
+    /// Turns what is above each node into ordinals, and checks nesting.
+    fn check_references(&self, kept: &mut Kept, half_edges: &[[u32; 4]]) -> Result<(), XfmError> {
+        for n in 0..kept.above.len() {
+            for (i, h) in half_edges[n].into_iter().enumerate() {
+                let Owner::Node(needed, side, _) = owner(h) else { continue };
+                let Some(m) = self.ordinal(&kept.flags, needed).filter(|&m| kept.sides[m][side]) else {
+                    return Err(self.wrong(n, "it needs a triangle that there is not"));
+                };
+                kept.above[n][i + 1] = m as u32;
+                if self.header().nested && !is_nested(&kept.bounds[n], &kept.bounds[m]) {
+                    return Err(self.wrong(n, "its bounds are not nested in those of a node that it needs"));
+                }
+            }
+            let parent = kept.above[n][0];
+            if parent != NONE {
+                let Some(m) = self.ordinal(&kept.flags, NodeId(parent)) else {
+                    return Err(self.wrong(n, "its parent is not there"));
+                };
+                kept.above[n][0] = m as u32;
+                if !is_nested(&kept.bounds[n], &kept.bounds[m]) {
+                    return Err(self.wrong(n, "its bounds are not nested in those of its parent"));
+                }
+            }
+        }
+        Ok(())
+    }
+
+    /// Needs and parents have no circle: a walk with an explicit stack, in which no node is met below itself.
+    fn check_order(&self, kept: &Kept) -> Result<(), XfmError> {
+        const NEW: u8 = 0;
+        const OPEN: u8 = 1;
+        const DONE: u8 = 2;
+        let mut state = vec![NEW; kept.above.len()];
+        let mut stack = Vec::new();
+        for start in 0..kept.above.len() {
+            if state[start] != NEW {
+                continue;
+            }
+            stack.push((start, 0));
+            state[start] = OPEN;
+            while let Some((n, next)) = stack.last_mut() {
+                let Some(&m) = kept.above[*n].get(*next) else {
+                    state[*n] = DONE;
+                    stack.pop();
+                    continue;
+                };
+                *next += 1;
+                match state.get(m as usize) {
+                    Some(&NEW) => {
+                        state[m as usize] = OPEN;
+                        stack.push((m as usize, 0));
+                    }
+                    Some(&OPEN) => return Err(self.wrong(m as usize, "it needs itself, by way of others")),
+                    _ => {}
+                }
+            }
+        }
+        Ok(())
+    }
+}
+
+/// Whether the outer sphere holds the inner, with room for rounding, and the outer error is no less.
+fn is_nested(inner: &Bounds, outer: &Bounds) -> bool {
+    let distance = crate::vector::distance(inner.center, outer.center);
+    let room = f64::from(outer.radius) - f64::from(inner.radius) - distance;
+    room >= f64::from(outer.radius) * SLACK && outer.eps >= inner.eps
+}

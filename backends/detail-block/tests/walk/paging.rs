@@ -1,0 +1,242 @@
+//! Quotas, loading in the background, and stores that fail.
+
+use std::sync::Arc;
+use std::time::Duration;
+
+use detail_block::{ATTEMPTS, Arrangement, BuildOptions, Loading, Settings, XfmFile};
+use vertex_tree::source::{Counted, Faults, Faulty, MemorySource, Throttled};
+use vertex_tree::{CollapseLog, NodeId, VertexTree};
+
+use crate::driver::{Driver, bytes_of, open};
+use crate::meshes::{Random, random_log, torus};
+use crate::{blocking, options};
+
+fn built(side: usize, options: &BuildOptions) -> (Vec<u8>, CollapseLog) {
+    let mut random = Random(11);
+    let log = random_log(torus(side, &mut random), &mut random);
+    let arrangement = Arrangement::new(&log, options).unwrap();
+    (bytes_of(&arrangement), arrangement.effective_log())
+}
+
+fn background(loading: Loading) -> Settings {
+    Settings { loading, grace: 0, ..Settings::default() }
+}
+
+/// One frame of random changes, more down than up or the reverse; `check` sees the driver after every step.
+fn frame(driver: &mut Driver, random: &mut Random, down: usize, check: &dyn Fn(&Driver)) {
+    let mut arrived = Vec::new();
+    driver.tree.begin_frame(&mut arrived).unwrap();
+    for _ in 0..12 {
+        let boundary = driver.boundary();
+        let collapsible: Vec<NodeId> =
+            driver.active.iter().copied().filter(|&n| driver.is_collapsible(n)).collect();
+        if random.below(10) < down && !boundary.is_empty() {
+            driver.unfold(boundary[random.below(boundary.len())]).unwrap();
+        } else if !collapsible.is_empty() {
+            driver.fold(collapsible[random.below(collapsible.len())]).unwrap();
+        }
+        check(driver);
+    }
+    driver.tree.end_frame().unwrap();
+    check(driver);
+}
+
+/// Whatever is asked for, blocks never take more than the hard quota, while quotas change now and then; and what is
+/// displayed is right all the time.
+#[test]
+fn the_hard_quota_is_never_exceeded() {
+    let (bytes, log) = built(30, &options(2, false, false));
+    let file = open(bytes);
+    let all = file.resident_bytes_of_all();
+    for loading in [Loading::Blocking, Loading::OnDemand, Loading::Background] {
+        let mut driver = Driver::new(&file, background(loading));
+        let mut random = Random(17);
+        let mut hard = all / 4;
+        driver.tree.set_quotas(all / 6, hard);
+        for round in 0..400 {
+            let down = [8, 8, 3, 5][round / 20 % 4];
+            frame(&mut driver, &mut random, down, &|driver| {
+                let (loaded, with_under_way) = driver.tree.block_bytes();
+                assert!(
+                    loaded <= hard && with_under_way <= hard,
+                    "{with_under_way} of {hard}, frame {round}"
+                );
+                driver.tree.assert_well_formed();
+            });
+            if round % 3 == 0 {
+                driver.tree.settle().unwrap();
+            }
+            if round % 100 == 99 {
+                driver.assert_shows(&log);
+                // More from now on: less could not be kept at once.
+                hard += all / 8;
+                driver.tree.set_quotas(all / 6, hard);
+            }
+        }
+        let counts = driver.tree.counts();
+        eprintln!("{loading:?}: {counts:?}, {} not resident", driver.not_resident);
+        assert!(
+            (counts.refused > 20 || loading != Loading::Blocking) && counts.removals > 100,
+            "{loading:?}: {counts:?}"
+        );
+    }
+}
+
+/// A hard quota below what the front occupies keeps everything where it is, and is kept to once the front has folded.
+#[test]
+fn a_hard_quota_lowered_below_the_front_takes_effect_as_it_folds() {
+    let (bytes, _) = built(16, &options(3, false, true));
+    let mut driver = Driver::new(&open(bytes), blocking());
+    let mut random = Random(2);
+    crate::unfold_all(&mut driver, &mut random);
+    let hard = driver.tree.block_bytes().0 / 3;
+    driver.tree.set_quotas(hard, hard);
+    for _ in 0..400 {
+        frame(&mut driver, &mut random, 2, &|driver| driver.tree.assert_well_formed());
+    }
+    assert!(driver.tree.block_bytes().0 <= hard);
+}
+
+/// Everything goes when the front is back at the roots and nothing may stay.
+#[test]
+fn without_a_quota_to_keep_anything_nothing_is_kept() {
+    let (bytes, _) = built(12, &BuildOptions::default());
+    let mut driver = Driver::new(&open(bytes), blocking());
+    crate::unfold_all(&mut driver, &mut Random(2));
+    driver.tree.set_quotas(0, u64::MAX);
+    crate::fold_all(&mut driver);
+    for _ in 0..3 {
+        driver.tree.begin_frame(&mut Vec::new()).unwrap();
+        driver.tree.end_frame().unwrap();
+    }
+    assert_eq!(driver.tree.block_bytes(), (0, 0));
+    driver.tree.assert_well_formed();
+}
+
+/// Reads fail, end early, bring flipped bits or come late. Each is counted, nothing wrong is ever shown, and in the end
+/// everything is there.
+#[test]
+fn faults_cost_nothing_but_time() {
+    let (bytes, log) = built(14, &options(2, false, false));
+    for (seed, loading) in [(1, Loading::OnDemand), (2, Loading::Background), (3, Loading::Blocking)] {
+        let faults =
+            Faults { errors: 60, short: 60, flips: 60, delays: 30, delay: Duration::from_micros(200) };
+        let source =
+            Arc::new(Faulty::new(MemorySource::new("bytes", bytes.clone()), seed, Faults::default()));
+        let file = Arc::new(XfmFile::open(source.clone()).unwrap());
+        source.set(faults);
+        let mut driver = Driver::new(&file, background(loading));
+        driver.tree.set_quotas(file.resident_bytes_of_all() / 10, u64::MAX);
+        let mut random = Random(seed);
+        let mut counted = 0;
+        for round in 0..600 {
+            driver.tree.begin_frame(&mut Vec::new()).unwrap();
+            for _ in 0..8 {
+                let boundary = driver.boundary();
+                if random.below(10) < [9, 4][round / 40 % 2] && !boundary.is_empty() {
+                    driver.unfold(boundary[random.below(boundary.len())]).unwrap();
+                } else if let Some(&node) = driver.active.iter().rev().find(|&&n| driver.is_collapsible(n)) {
+                    driver.fold(node).unwrap();
+                }
+            }
+            driver.tree.assert_well_formed();
+            counted += driver.tree.end_frame().unwrap().faults;
+            // However slow the machine, something is loaded.
+            if round % 2 == 0 {
+                driver.tree.settle().unwrap();
+            }
+        }
+        driver.assert_shows(&log);
+        driver.tree.settle().unwrap();
+        driver.tree.begin_frame(&mut Vec::new()).unwrap();
+        counted += driver.tree.end_frame().unwrap().faults;
+        assert!(source.befallen() > 10, "{loading:?}: only {} faults", source.befallen());
+        assert_eq!(counted, source.befallen(), "{loading:?}: every fault is counted");
+        source.set(Faults::default());
+        for _ in 0..1000 {
+            driver.tree.begin_frame(&mut Vec::new()).unwrap();
+            for node in driver.boundary() {
+                driver.unfold(node).unwrap();
+            }
+            driver.tree.end_frame().unwrap();
+            driver.tree.settle().unwrap();
+        }
+        assert_eq!(driver.tree.displayed_triangles(), log.mesh.triangles.len() as u64, "{loading:?}");
+        driver.assert_shows(&log);
+    }
+}
+
+/// A store that never answers is an error after so many attempts, and not the end: when it is back, so is the mesh.
+#[test]
+fn a_store_that_stays_away_is_an_error() {
+    let (bytes, _) = built(10, &BuildOptions::default());
+    let source = Arc::new(Faulty::new(MemorySource::new("bytes", bytes), 1, Faults::default()));
+    let file = Arc::new(XfmFile::open(source.clone()).unwrap());
+    source.set(Faults { errors: 1000, ..Faults::default() });
+    let mut driver = Driver::new(&file, background(Loading::OnDemand));
+    let root = driver.tree.roots()[0];
+    let mut failed_after = 0;
+    for attempt in 0..=ATTEMPTS {
+        if let Err(error) = driver.tree.begin_frame(&mut Vec::new()) {
+            failed_after = attempt;
+            assert!(error.to_string().starts_with("bytes: reading"), "{error}");
+            break;
+        }
+        assert!(!driver.unfold(root).unwrap());
+        driver.tree.settle().unwrap();
+    }
+    assert_eq!(failed_after, ATTEMPTS);
+    source.set(Faults::default());
+    for _ in 0..3 {
+        driver.tree.begin_frame(&mut Vec::new()).unwrap();
+        driver.unfold(root).unwrap();
+        driver.tree.settle().unwrap();
+    }
+    assert!(driver.active.contains(&root));
+}
+
+/// A slow store keeps no frame waiting; what is near is loaded before it is asked for.
+#[test]
+fn loads_ahead_spare_misses() {
+    let (bytes, _) = built(40, &options(3, false, true));
+    let misses = |loading| {
+        let slow = Throttled::new(MemorySource::new("bytes", bytes.clone()), Duration::from_micros(50), None);
+        let source = Arc::new(Counted::new(slow));
+        let file = Arc::new(XfmFile::open(source.clone()).unwrap());
+        let mut driver = Driver::new(&file, background(loading));
+        let mut random = Random(4);
+        for _ in 0..150 {
+            frame(&mut driver, &mut random, 9, &|_| ());
+            // The store has the time of a frame.
+            driver.tree.settle().unwrap();
+        }
+        (driver.not_resident, driver.tree.counts())
+    };
+    let (on_demand, with_ahead) = (misses(Loading::OnDemand), misses(Loading::Background));
+    eprintln!("{on_demand:?} {with_ahead:?}");
+    assert!(on_demand.1.ahead == 0 && with_ahead.1.ahead > 100);
+    assert!(with_ahead.0 * 5 < on_demand.0 * 4, "{} misses, {} without", with_ahead.0, on_demand.0);
+}
+
+/// What has just become a candidate stays for a while, whatever the soft quota; not so where the hard one is in need.
+#[test]
+fn a_grace_keeps_what_has_just_been_used() {
+    let (bytes, _) = built(12, &BuildOptions::default());
+    let file = open(bytes);
+    let mut driver = Driver::new(&file, Settings { grace: 20, ..blocking() });
+    crate::unfold_all(&mut driver, &mut Random(2));
+    crate::fold_all(&mut driver);
+    driver.tree.set_quotas(0, u64::MAX);
+    for frame in 1..=30 {
+        driver.tree.begin_frame(&mut Vec::new()).unwrap();
+        driver.tree.end_frame().unwrap();
+        assert_eq!(driver.tree.block_bytes().0 == 0, frame > 20, "frame {frame}");
+    }
+    let mut driver = Driver::new(&file, Settings { grace: 20, ..blocking() });
+    crate::unfold_all(&mut driver, &mut Random(2));
+    crate::fold_all(&mut driver);
+    driver.tree.set_quotas(0, 0);
+    driver.tree.begin_frame(&mut Vec::new()).unwrap();
+    driver.tree.end_frame().unwrap();
+    assert_eq!(driver.tree.block_bytes().0, 0);
+}

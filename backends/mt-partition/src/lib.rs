@@ -1,0 +1,79 @@
+//! A backend of foldfront: the partitioned multi-triangulation of Holst & Schumann (Memory-Efficient View-Dependent Level
+//! of Detail of High-Detailed Meshes, 2007).
+//!
+//! ```
+//! # use std::sync::Arc;
+//! # use vertex_tree::source::FileSource;
+//! # use vertex_tree::{CollapseLog, NullSink, VertexTree};
+//! # use mt_partition::{BuildOptions, MtFile, MtTree, Settings, write};
+//! # fn main() -> Result<(), Box<dyn std::error::Error>> {
+//! # let folder = tempfile::tempdir()?;
+//! # let path = folder.path().join("example.mt");
+//! # let log = CollapseLog::default();
+//! write(&path, &log, &BuildOptions::default())?; // once a model
+//! let file = Arc::new(MtFile::open(Arc::new(FileSource::open(&path)?))?);
+//! let mut tree = MtTree::new(file, Settings::default())?; // once a viewer
+//! tree.base_mesh(&mut NullSink)?;
+//! # Ok(())
+//! # }
+//! ```
+//!
+//! A collapse of the log is a node of a directed acyclic graph; an arc from one node to another holds the triangles that
+//! the lower one makes and the upper one takes away ([`versions`]). Nodes are merged until arcs hold about ten triangles
+//! ([`reduce`]), laid out in partitions ([`partition`]), and written to a file that keeps patches with their nodes
+//! ([`format`](mod@format), [`record`]). At run time the displayed mesh is a set of arcs ([`display`]); nodes are read by a
+//! thread ([`reader`]) and let go of by one of four modes ([`cache`]).
+//!
+//! When to prefer it: where drawing and selection should handle patches and not single triangles, and where many objects
+//! share little memory. When not: a node of this graph stands for a dozen collapses, so the cut is coarser, and shows more
+//! triangles for the same error.
+
+mod bounds;
+mod build;
+mod cache;
+mod display;
+mod error;
+mod file;
+mod format;
+mod graph;
+mod memory;
+mod order;
+mod paging;
+mod partition;
+mod plan;
+mod reader;
+mod record;
+mod reduce;
+mod residents;
+mod strips;
+mod tree;
+mod verify;
+mod versions;
+
+pub use build::{WriteReport, write};
+pub use cache::CacheMode;
+pub use error::MtError;
+pub use file::{MtFile, StoredNode};
+pub use format::MAGIC;
+pub use memory::Memory;
+pub use partition::QueueOrder;
+pub use reader::Reader;
+pub use tree::{MtTree, Settings};
+
+/// How to build a file.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct BuildOptions {
+    /// Nodes are merged until arcs hold so many triangles on average; 0 leaves the graph as it is.
+    pub patch: f64,
+    /// Nodes in a partition, at most. The paper advises 20 for one object, 50 to 100 for many.
+    pub partition: u32,
+    /// In which order partitions are merged.
+    pub order: QueueOrder,
+}
+
+impl Default for BuildOptions {
+    /// Patches of 10 triangles, partitions of 20 nodes.
+    fn default() -> Self {
+        Self { patch: 10.0, partition: 20, order: QueueOrder::default() }
+    }
+}

@@ -1,0 +1,173 @@
+//! The nodes in memory.
+
+use std::collections::VecDeque;
+
+use vertex_tree::NONE;
+
+use crate::memory::Memory;
+use crate::record::Record;
+
+/// A node in memory.
+#[derive(Debug)]
+struct Resident {
+    node: u32,
+    record: Record,
+    /// Requests under way that rely on it.
+    pins: u32,
+    /// The last frame in which it must stay.
+    stays: u64,
+    /// Its place in the queue: earlier ones are out of date.
+    stamp: u32,
+}
+
+/// What a node takes in memory beyond its record.
+pub(crate) const OVERHEAD: u64 = (size_of::<Resident>() + size_of::<(u32, u32)>()) as u64;
+
+/// The nodes in memory, by number and by when they were last used.
+#[derive(Debug)]
+pub(crate) struct Residents {
+    /// For each node, its place among `all`; [`NONE`] if it is not in memory.
+    slots: Vec<u32>,
+    all: Vec<Resident>,
+    /// Nodes with the stamps that they had then: as they were loaded or left the cut.
+    queue: VecDeque<(u32, u32)>,
+    stamp: u32,
+    /// Where the search for a node of the cut to let go of goes on.
+    hand: usize,
+    bytes: u64,
+    memory: Memory,
+}
+
+impl Residents {
+    pub fn new(nodes: u32, memory: Memory) -> Self {
+        Self {
+            slots: vec![NONE; nodes as usize],
+            all: Vec::new(),
+            queue: VecDeque::new(),
+            stamp: 0,
+            hand: 0,
+            bytes: 0,
+            memory,
+        }
+    }
+
+    pub fn bytes(&self) -> u64 {
+        self.bytes
+    }
+
+    pub fn memory(&self) -> &Memory {
+        &self.memory
+    }
+
+    pub fn contains(&self, node: u32) -> bool {
+        self.slots[node as usize] != NONE
+    }
+
+    #[inline]
+    pub fn get(&self, node: u32) -> Option<&Record> {
+        self.all.get(self.slots[node as usize] as usize).map(|r| &r.record)
+    }
+
+    fn get_mut(&mut self, node: u32) -> Option<&mut Resident> {
+        self.all.get_mut(self.slots[node as usize] as usize)
+    }
+
+    /// Takes in a node of so many bytes, for which room has been reserved, and which is not in memory.
+    pub fn insert(&mut self, node: u32, record: Record, bytes: u64) {
+        self.slots[node as usize] = self.all.len() as u32;
+        self.all.push(Resident { node, record, pins: 0, stays: 0, stamp: 0 });
+        self.bytes += bytes;
+        self.touch(node);
+    }
+
+    /// The node goes to the end of the queue.
+    pub fn touch(&mut self, node: u32) {
+        self.stamp = self.stamp.wrapping_add(1);
+        let stamp = self.stamp;
+        if let Some(resident) = self.get_mut(node) {
+            resident.stamp = stamp;
+            self.queue.push_back((node, stamp));
+            // Entries that are out of date are not worth more memory than the nodes are.
+            if self.queue.len() > 4 * self.all.len() + 64 {
+                let Self { queue, slots, all, .. } = self;
+                queue.retain(|&(n, s)| all.get(slots[n as usize] as usize).is_some_and(|r| r.stamp == s));
+            }
+        }
+    }
+
+    /// A request relies on the node from now on.
+    pub fn pin(&mut self, node: u32) {
+        if let Some(resident) = self.get_mut(node) {
+            resident.pins += 1;
+        }
+    }
+
+    /// A request that relied on the node has been answered: it stays for another frame.
+    pub fn unpin(&mut self, node: u32, frame: u64) {
+        if let Some(resident) = self.get_mut(node) {
+            resident.pins = resident.pins.saturating_sub(1);
+            resident.stays = frame;
+        }
+    }
+
+    /// Whether the node may go.
+    pub fn is_free(&self, node: u32, frame: u64) -> bool {
+        self.all.get(self.slots[node as usize] as usize).is_some_and(|r| r.pins == 0 && r.stays < frame)
+    }
+
+    /// Lets go of a node that takes so many bytes.
+    pub fn remove(&mut self, node: u32, bytes: u64) {
+        let slot = std::mem::replace(&mut self.slots[node as usize], NONE) as usize;
+        if slot >= self.all.len() {
+            return;
+        }
+        self.all.swap_remove(slot);
+        if let Some(moved) = self.all.get(slot) {
+            self.slots[moved.node as usize] = slot as u32;
+        }
+        self.bytes -= bytes;
+        self.memory.release(bytes);
+    }
+
+    /// The least recently used of the nodes that may go and that `other` does not hold back.
+    pub fn oldest(&mut self, frame: u64, held_back: impl Fn(u32) -> bool) -> Option<u32> {
+        let mut later = Vec::new();
+        let mut found = None;
+        while let Some(&(node, stamp)) = self.queue.front() {
+            let is_current =
+                self.all.get(self.slots[node as usize] as usize).is_some_and(|r| r.stamp == stamp);
+            if is_current && !held_back(node) {
+                if self.is_free(node, frame) {
+                    found = Some(node);
+                    break;
+                }
+                // Its turn comes again.
+                later.push((node, stamp));
+            }
+            // What is held back is in the cut, and comes to the end of the queue when it leaves it.
+            self.queue.pop_front();
+        }
+        for entry in later.into_iter().rev() {
+            self.queue.push_front(entry);
+        }
+        found
+    }
+
+    /// Any node that may go, each once in a while.
+    pub fn any(&mut self, frame: u64) -> Option<u32> {
+        for _ in 0..self.all.len() {
+            self.hand = if self.hand + 1 < self.all.len() { self.hand + 1 } else { 0 };
+            let node = self.all[self.hand].node;
+            if self.is_free(node, frame) {
+                return Some(node);
+            }
+        }
+        None
+    }
+}
+
+impl Drop for Residents {
+    fn drop(&mut self) {
+        self.memory.release(self.bytes);
+    }
+}

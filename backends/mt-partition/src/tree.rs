@@ -1,0 +1,224 @@
+//! The tree that the engine unfolds and folds.
+
+use std::sync::Arc;
+
+use vertex_tree::{Bounds, MeshSink, NONE, NodeId, PageStats, Step, TreeError, VertexId, VertexTree};
+
+use crate::MtError;
+use crate::cache::CacheMode;
+use crate::display::Display;
+use crate::file::MtFile;
+use crate::memory::Memory;
+use crate::paging::{Change, Paging};
+use crate::reader::Reader;
+
+/// How a tree pages.
+#[derive(Clone, Debug, Default)]
+pub struct Settings {
+    /// What is read at once, and what is kept.
+    pub cache: CacheMode,
+    /// The budget, which other trees may hold clones of.
+    pub memory: Memory,
+    /// The thread that reads, which other trees may use too; without, the tree gets one of its own.
+    pub reader: Option<Reader>,
+}
+
+/// A file and the state of one front through it.
+///
+/// The structure is a graph: a node may have several parents, all of them structural. Bounds are nested along every arc,
+/// so nothing is needed beyond structure.
+#[derive(Debug)]
+pub struct MtTree {
+    file: Arc<MtFile>,
+    memory: Memory,
+    paging: Paging,
+    /// Kept only for a sink that wants the mesh.
+    display: Option<Display>,
+    displayed: u64,
+    above: Vec<u32>,
+    below: Vec<u32>,
+}
+
+impl MtTree {
+    /// A tree with every node folded.
+    ///
+    /// # Errors
+    /// [`MtError::Memory`] if the budget is below [`MtFile::least_memory`], [`MtError::Io`] if a thread can not be had.
+    pub fn new(file: Arc<MtFile>, settings: Settings) -> Result<Self, MtError> {
+        let Settings { cache, memory, reader } = settings;
+        let (allowed, needed) = (memory.limit(), file.least_memory());
+        if allowed < needed {
+            return Err(MtError::Memory { allowed, needed });
+        }
+        let thread = |source| MtError::Io { file: file.name().to_owned(), offset: 0, length: 0, source };
+        let reader = reader.map_or_else(|| Reader::new().map_err(thread), Ok)?;
+        Ok(Self {
+            paging: Paging::new(file.clone(), cache, memory.clone(), reader),
+            memory,
+            display: None,
+            displayed: u64::from(file.base.fine()),
+            above: Vec::new(),
+            below: Vec::new(),
+            file,
+        })
+    }
+
+    /// The file that the tree shows.
+    #[must_use]
+    pub fn file(&self) -> &Arc<MtFile> {
+        &self.file
+    }
+
+    /// The budget: its limit may be changed between frames.
+    #[must_use]
+    pub fn memory(&self) -> &Memory {
+        &self.memory
+    }
+
+    /// Bytes of the nodes in memory.
+    #[must_use]
+    pub fn node_bytes(&self) -> u64 {
+        self.paging.residents.bytes()
+    }
+
+    /// The input vertex that is shown in a slot; `None` in a hole, and for a sink that does not keep the mesh.
+    #[must_use]
+    pub fn input_vertex(&self, vertex: VertexId) -> Option<u32> {
+        self.display.as_ref()?.input_vertex(vertex)
+    }
+
+    /// A change of the front that has been made: the cut and the count of triangles follow. Returns the arcs above and
+    /// below.
+    fn change(&mut self, node: u32, change: Change) {
+        let Some(record) = self.paging.residents.get(node) else { return };
+        let (coarse, fine) = (u64::from(record.coarse()), u64::from(record.fine()));
+        self.above.clear();
+        self.above.extend(record.above().map(|(n, _)| n));
+        let arcs_above = self.above.len();
+        self.above.retain(|&n| n != NONE);
+        self.below.clear();
+        self.below.extend(record.below());
+        let arcs = match change {
+            Change::Unfold => {
+                self.displayed = (self.displayed + fine).saturating_sub(coarse);
+                record.arcs().len()
+            }
+            Change::Fold => {
+                self.displayed = (self.displayed + coarse).saturating_sub(fine);
+                arcs_above
+            }
+        };
+        self.paging.changed(node, change, &self.above, &self.below, arcs as u32);
+    }
+
+    fn check_reader(&self) -> Result<(), TreeError> {
+        if !self.paging.is_lost {
+            return Ok(());
+        }
+        let source = std::io::Error::other("the thread that reads has ended");
+        Err(TreeError::Read { file: self.file.name().to_owned(), offset: 0, length: 0, source })
+    }
+}
+
+impl VertexTree for MtTree {
+    fn node_limit(&self) -> u32 {
+        self.file.nodes()
+    }
+
+    fn displayed_triangles(&self) -> u64 {
+        self.displayed
+    }
+
+    fn roots(&self) -> &[NodeId] {
+        &self.file.roots
+    }
+
+    fn bounds(&self, node: NodeId) -> Bounds {
+        let record = || self.paging.residents.get(node.0).map(crate::record::Record::bounds);
+        // Asked of nothing but roots and what is in memory.
+        record().or_else(|| self.file.root_bounds(node)).unwrap_or(Bounds {
+            center: [0.0; 3],
+            radius: 0.0,
+            eps: 0.0,
+        })
+    }
+
+    #[inline]
+    fn children(&self, node: NodeId) -> impl Iterator<Item = NodeId> {
+        self.paging.residents.get(node.0).into_iter().flat_map(|record| record.below().map(NodeId))
+    }
+
+    #[inline]
+    fn parents(&self, node: NodeId) -> impl Iterator<Item = NodeId> {
+        let record = self.paging.residents.get(node.0);
+        record
+            .into_iter()
+            .flat_map(|record| record.above().map(|(n, _)| n).filter(|&n| n != NONE).map(NodeId))
+    }
+
+    fn log_number(&self, node: NodeId) -> u32 {
+        self.file.log_numbers[node.index()]
+    }
+
+    fn base_mesh<M: MeshSink>(&mut self, mesh: &mut M) -> Result<(), TreeError> {
+        if M::KEEPS_MESH {
+            let mut display = Display::new();
+            display.show(&self.file.base, |_, _| true, mesh);
+            self.display = Some(display);
+        }
+        Ok(())
+    }
+
+    fn unfold<M: MeshSink>(&mut self, node: NodeId, mesh: &mut M) -> Result<Step, TreeError> {
+        if !self.paging.has(node.0, Change::Unfold) {
+            return Ok(Step::NotResident);
+        }
+        self.change(node.0, Change::Unfold);
+        if let (true, Some(display), Some(record)) =
+            (M::KEEPS_MESH, &mut self.display, self.paging.residents.get(node.0))
+        {
+            // What appears first shares vertices with what disappears then.
+            display.show(record, |_, _| true, mesh);
+            for (above, _) in record.above() {
+                display.hide(above, node.0, mesh);
+            }
+        }
+        Ok(Step::Done)
+    }
+
+    fn fold<M: MeshSink>(&mut self, node: NodeId, mesh: &mut M) -> Result<Step, TreeError> {
+        if !self.paging.has(node.0, Change::Fold) {
+            return Ok(Step::NotResident);
+        }
+        self.change(node.0, Change::Fold);
+        if let (true, Some(display), Some(record)) =
+            (M::KEEPS_MESH, &mut self.display, self.paging.residents.get(node.0))
+        {
+            for (above, position) in record.above() {
+                let parent =
+                    if above == NONE { Some(&self.file.base) } else { self.paging.residents.get(above) };
+                if let Some(parent) = parent {
+                    display.show(parent, |at, below| at == position as usize && below == node.0, mesh);
+                }
+            }
+            for arc in record.arcs() {
+                display.hide(node.0, arc.below, mesh);
+            }
+        }
+        Ok(Step::Done)
+    }
+
+    fn begin_frame(&mut self, arrived: &mut Vec<NodeId>) -> Result<(), TreeError> {
+        self.paging.begin_frame(arrived);
+        self.check_reader()
+    }
+
+    fn settle(&mut self) -> Result<(), TreeError> {
+        self.paging.settle();
+        self.check_reader()
+    }
+
+    fn end_frame(&mut self) -> Result<PageStats, TreeError> {
+        Ok(self.paging.end_frame())
+    }
+}

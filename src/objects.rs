@@ -1,0 +1,239 @@
+//! Several objects in one scene, each with a hierarchy and a placement of its own, over any backend.
+//!
+//! Every object keeps its own space, and an engine of its own: it is the views that are brought to the objects. That is
+//! exact, as views are in double precision, and a similarity changes nothing that the criterion asks: distances, radii and
+//! errors are scaled alike, angles stay. One tree over all objects would have to bring spheres to the scene instead, and
+//! spheres are in single precision. Rounding moves a centre by up to a few units in its last place, which is more than the
+//! room that construction leaves between nested spheres, a millionth of the radius, unless the radius is more than about a
+//! tenth of the distance from the scene's origin. Nearly every child would stick out of its parent, and the front would
+//! depend on its history.
+//!
+//! What the objects share is up to their backends: trees of `mt-partition` take clones of one memory budget and one reader.
+
+mod scene_file;
+
+use std::time::Duration;
+
+use glam::{DMat3, DQuat, DVec3};
+use vertex_tree::{MeshSink, PageStats, TreeError, VertexTree};
+
+use crate::engine::{Engine, FrameReport, Limit, Settings};
+use crate::view::View;
+
+pub use scene_file::{SceneFileError, read_scene};
+
+/// Where an object is in the scene: scaled, then turned, then moved.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Placement {
+    /// How much larger the object is in the scene, above 0.
+    pub scale: f64,
+    /// How it is turned.
+    pub rotation: DQuat,
+    /// Where its origin is, in units of the scene.
+    pub translation: DVec3,
+}
+
+/// A matrix does not place an object.
+#[derive(Clone, Copy, Debug, PartialEq, thiserror::Error)]
+#[non_exhaustive]
+pub enum PlacementError {
+    /// A number is not finite.
+    #[error("the matrix has a number that is not finite")]
+    NotFinite,
+    /// The matrix flattens the object.
+    #[error("the matrix has no volume: its determinant is {determinant}")]
+    Flat {
+        /// As found.
+        determinant: f64,
+    },
+    /// The matrix mirrors the object, which would turn its triangles over.
+    #[error("the matrix mirrors: its determinant is {determinant}")]
+    Mirrored {
+        /// As found.
+        determinant: f64,
+    },
+    /// The matrix stretches or shears the object.
+    #[error(
+        "the matrix stretches or shears by {by}: only one scale, a rotation and a translation are allowed"
+    )]
+    Stretched {
+        /// Largest deviation from a rotation, as a share of the scale.
+        by: f64,
+    },
+}
+
+/// What a matrix written as text may be away from a rotation.
+const TOLERANCE: f64 = 1e-4;
+
+impl Placement {
+    /// The object where it was modelled.
+    pub const IDENTITY: Self = Self { scale: 1.0, rotation: DQuat::IDENTITY, translation: DVec3::ZERO };
+
+    /// Takes a 3 by 4 matrix, row by row: the linear part in the first three columns, the translation in the last.
+    ///
+    /// # Errors
+    /// Unless the linear part is a rotation times a scale, up to what text rounds away.
+    pub fn from_rows(rows: [f64; 12]) -> Result<Self, PlacementError> {
+        if !rows.iter().all(|x| x.is_finite()) {
+            return Err(PlacementError::NotFinite);
+        }
+        let column = |i: usize| DVec3::new(rows[i], rows[4 + i], rows[8 + i]);
+        let linear = DMat3::from_cols(column(0), column(1), column(2));
+        let determinant = linear.determinant();
+        let size = linear.to_cols_array().iter().fold(0.0_f64, |size, x| size.max(x.abs()));
+        if determinant.abs() <= size.powi(3) * TOLERANCE {
+            return Err(PlacementError::Flat { determinant });
+        }
+        if determinant < 0.0 {
+            return Err(PlacementError::Mirrored { determinant });
+        }
+        let scale = determinant.cbrt();
+        let turned = linear * (1.0 / scale);
+        let off = turned.transpose() * turned - DMat3::IDENTITY;
+        let by = off.to_cols_array().iter().fold(0.0_f64, |by, x| by.max(x.abs()));
+        if by > TOLERANCE {
+            return Err(PlacementError::Stretched { by });
+        }
+        Ok(Self { scale, rotation: DQuat::from_mat3(&turned).normalize(), translation: column(3) })
+    }
+
+    /// Where a point of the object is in the scene.
+    #[must_use]
+    pub fn place(&self, point: DVec3) -> DVec3 {
+        self.translation + self.rotation * (self.scale * point)
+    }
+
+    /// A view of the scene as a view of the object.
+    #[must_use]
+    pub fn view(&self, view: &View) -> View {
+        let back = self.rotation.conjugate();
+        View {
+            eye: back * (view.eye - self.translation) / self.scale,
+            direction: (back * view.direction).normalize(),
+            ..*view
+        }
+    }
+}
+
+/// An object: its placement, and the engine that follows the views in its own space.
+pub struct Object<T, M> {
+    placement: Placement,
+    engine: Engine<T, M>,
+}
+
+impl<T: VertexTree, M: MeshSink> Object<T, M> {
+    /// Where it is.
+    pub fn placement(&self) -> &Placement {
+        &self.placement
+    }
+
+    /// Its engine; the displayed mesh is in the object's space.
+    pub fn engine(&self) -> &Engine<T, M> {
+        &self.engine
+    }
+
+    /// Its engine, to take changes of the mesh or to reach the backend.
+    pub fn engine_mut(&mut self) -> &mut Engine<T, M> {
+        &mut self.engine
+    }
+}
+
+/// The objects of a scene.
+pub struct Objects<T, M> {
+    objects: Vec<Object<T, M>>,
+    views: Vec<View>,
+}
+
+impl<T: VertexTree, M: MeshSink> Objects<T, M> {
+    /// Starts with every object at its coarsest. The settings are those of the scene, with `rho` in its units; a budget
+    /// would be each object's own.
+    ///
+    /// # Errors
+    /// What a backend reports.
+    pub fn new(
+        parts: impl IntoIterator<Item = (T, M, Placement)>,
+        settings: Settings,
+    ) -> Result<Self, TreeError> {
+        let object = |(tree, mesh, placement): (T, M, Placement)| {
+            let settings = Settings { rho: settings.rho / placement.scale, ..settings };
+            Ok(Object { placement, engine: Engine::new(tree, mesh, settings)? })
+        };
+        Ok(Self { objects: parts.into_iter().map(object).collect::<Result<_, _>>()?, views: Vec::new() })
+    }
+
+    /// The objects, in order.
+    pub fn objects(&self) -> &[Object<T, M>] {
+        &self.objects
+    }
+
+    /// The objects, in order.
+    pub fn objects_mut(&mut self) -> &mut [Object<T, M>] {
+        &mut self.objects
+    }
+
+    /// Moves the front of every object to where these views of the scene want it; the report is that of all of them
+    /// together.
+    ///
+    /// # Errors
+    /// The first that a backend reports. The other objects have been moved all the same.
+    pub fn advance(&mut self, views: &[View]) -> Result<FrameReport, TreeError> {
+        let mut all = FrameReport {
+            select: Duration::ZERO,
+            apply: Duration::ZERO,
+            tests: 0,
+            unfolds: 0,
+            folds: 0,
+            forced: 0,
+            carried: 0,
+            blocked: 0,
+            misses: 0,
+            active_nodes: 0,
+            triangles: 0,
+            cut_hash: 0,
+            limit: Limit::Error,
+            pages: PageStats::default(),
+        };
+        let mut failure = None;
+        for (number, object) in (0_u64..).zip(&mut self.objects) {
+            self.views.clear();
+            self.views.extend(views.iter().map(|view| object.placement.view(view)));
+            match object.engine.advance(&self.views) {
+                Ok(report) => add(&mut all, &report, number),
+                Err(error) => failure = failure.or(Some(error)),
+            }
+        }
+        failure.map_or(Ok(all), Err)
+    }
+
+    /// Waits until every page that has been asked for has arrived or failed.
+    ///
+    /// # Errors
+    /// The first that a backend reports.
+    pub fn settle(&mut self) -> Result<(), TreeError> {
+        self.objects.iter_mut().try_for_each(|object| object.engine.tree_mut().settle())
+    }
+}
+
+/// Adds the report of an object to that of the scene.
+fn add(all: &mut FrameReport, report: &FrameReport, number: u64) {
+    all.select += report.select;
+    all.apply += report.apply;
+    all.tests += report.tests;
+    all.unfolds += report.unfolds;
+    all.folds += report.folds;
+    all.forced += report.forced;
+    all.carried += report.carried;
+    all.blocked += report.blocked;
+    all.misses += report.misses;
+    all.active_nodes += report.active_nodes;
+    all.triangles += report.triangles;
+    // The same cut of another object counts as another.
+    all.cut_hash = all.cut_hash.wrapping_add(report.cut_hash.wrapping_mul(2 * number + 1));
+    if report.limit != Limit::Error {
+        all.limit = report.limit;
+    }
+    all.pages.reads += report.pages.reads;
+    all.pages.read_bytes += report.pages.read_bytes;
+    all.pages.resident_bytes += report.pages.resident_bytes;
+    all.pages.faults += report.pages.faults;
+}

@@ -1,0 +1,72 @@
+//! A backend that never misses: it waits for every page at once, so that cuts are comparable in every frame.
+
+use foldfront::Bounds;
+use foldfront::vertex_tree::{MeshSink, NodeId, PageStats, Step, TreeError, VertexTree};
+
+/// Waits inside of a change until what it needs has come. For backends that let frames begin and end at any time.
+pub struct Settled<T>(pub T);
+
+/// A change that is refused more often is never made.
+const PATIENCE: usize = 100;
+
+impl<T: VertexTree> Settled<T> {
+    fn insist(
+        &mut self,
+        mut change: impl FnMut(&mut T) -> Result<Step, TreeError>,
+    ) -> Result<Step, TreeError> {
+        for _ in 0..PATIENCE {
+            match change(&mut self.0)? {
+                Step::NotResident => {
+                    self.0.settle()?;
+                    self.0.begin_frame(&mut Vec::new())?;
+                }
+                step => return Ok(step),
+            }
+        }
+        Ok(Step::NotResident)
+    }
+}
+
+impl<T: VertexTree> VertexTree for Settled<T> {
+    const IS_TREE: bool = T::IS_TREE;
+
+    fn node_limit(&self) -> u32 {
+        self.0.node_limit()
+    }
+    fn displayed_triangles(&self) -> u64 {
+        self.0.displayed_triangles()
+    }
+    fn roots(&self) -> &[NodeId] {
+        self.0.roots()
+    }
+    fn bounds(&self, node: NodeId) -> Bounds {
+        self.0.bounds(node)
+    }
+    fn children(&self, node: NodeId) -> impl Iterator<Item = NodeId> {
+        self.0.children(node)
+    }
+    fn parents(&self, node: NodeId) -> impl Iterator<Item = NodeId> {
+        self.0.parents(node)
+    }
+    fn log_number(&self, node: NodeId) -> u32 {
+        self.0.log_number(node)
+    }
+    fn base_mesh<M: MeshSink>(&mut self, mesh: &mut M) -> Result<(), TreeError> {
+        self.0.base_mesh(mesh)
+    }
+    fn unfold<M: MeshSink>(&mut self, node: NodeId, mesh: &mut M) -> Result<Step, TreeError> {
+        self.insist(|tree| tree.unfold(node, mesh))
+    }
+    fn fold<M: MeshSink>(&mut self, node: NodeId, mesh: &mut M) -> Result<Step, TreeError> {
+        self.insist(|tree| tree.fold(node, mesh))
+    }
+    fn begin_frame(&mut self, arrived: &mut Vec<NodeId>) -> Result<(), TreeError> {
+        self.0.begin_frame(arrived)
+    }
+    fn settle(&mut self) -> Result<(), TreeError> {
+        self.0.settle()
+    }
+    fn end_frame(&mut self) -> Result<PageStats, TreeError> {
+        self.0.end_frame()
+    }
+}

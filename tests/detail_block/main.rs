@@ -1,0 +1,310 @@
+//! Trees of detail blocks under the engine: all data build and fly, quotas hold, forced cuts are what they should be.
+
+#[path = "../common/mod.rs"]
+mod common;
+
+use std::collections::HashSet;
+use std::sync::Arc;
+use std::time::Duration;
+
+use common::detail_block::{OwnCut, advance_settled, file, loading, options};
+use common::{Random, data, random_step, random_view};
+use detail_block::{Arrangement, Loading, XfmFile, XfmTree};
+use foldfront::active_mesh::ActiveMesh;
+use foldfront::criterion::Criterion;
+use foldfront::engine::{Engine, Settings};
+use foldfront::front::mix;
+use foldfront::path::{around, recorded};
+use foldfront::refine::Strategy;
+use foldfront::scene::{Scene, SceneKind};
+use foldfront::simplify;
+use foldfront::vertex_tree::source::{Faults, Faulty, MemorySource};
+use foldfront::vertex_tree::{NONE, NullSink, VertexTree};
+use foldfront::view::{View, theta_of_pixels};
+use foldfront::{CollapseLog, Mesh};
+use glam::DVec3;
+
+/// A view of a walk around the origin, brought to a mesh.
+fn placed(mesh: &Mesh, view: View) -> View {
+    let (lo, hi) = mesh.bounding_box().unwrap();
+    let [lo, hi] = [lo, hi].map(|p| DVec3::from(p.map(f64::from)));
+    View { eye: (lo + hi) / 2.0 + mesh.extent() / 2.0 * view.eye, ..view }
+}
+
+fn settings(mesh: &Mesh, strategy: Strategy) -> Settings {
+    Settings { strategy, rho: 0.01 * mesh.extent(), ..Settings::default() }
+}
+
+/// Builds a file of a log, checks all of it, and flies around: every cut that is looked at is the brute-force one and a
+/// manifold mesh, closed where the input is.
+fn flies(name: &str, log: &CollapseLog, is_manifold: bool, is_closed: bool) {
+    let arrangement = Arrangement::new(log, &options(false, true)).unwrap();
+    let report = arrangement.report();
+    eprintln!("{name}: {report:?}");
+    if is_manifold {
+        let split = (report.cut_edges, report.added_vertices, report.left_out);
+        assert_eq!(split, (0, 0, 0), "{name} is manifold");
+    }
+    let file = file(&arrangement);
+    file.verify().unwrap();
+    let effective = arrangement.effective_log();
+    drop(arrangement);
+    let mut cut = OwnCut::new(&effective);
+    let path = around(&log.mesh);
+    let tree = XfmTree::new(file, loading(Loading::Blocking)).unwrap();
+    let settings = settings(&log.mesh, Strategy::Event);
+    let mut engine = Engine::new(tree, ActiveMesh::new(), settings).unwrap();
+    let mut most = 0;
+    for frame in (0..path.frames.len()).step_by(60) {
+        let view = View::new(&path.camera(frame), theta_of_pixels(1.0, 1080));
+        let report = advance_settled(&mut engine, &[view]);
+        let found = (report.cut_hash, report.active_nodes, report.triangles);
+        assert_eq!(found, cut.find(&settings, engine.views()), "{name}, frame {frame}");
+        assert_eq!(report.forced, 0, "{name}, frame {frame}: bounds are nested over all needs");
+        engine.tree().assert_well_formed();
+        if is_closed {
+            assert_closed(engine.mesh());
+        }
+        most = report.triangles.max(most);
+    }
+    assert!(most > report.initial_faces + 1000, "{name}: next to nothing is shown");
+    // Looking in all directions, with every sphere too large: the input, triangle for triangle.
+    let settings = Settings { criterion: Criterion::SphereSize, ..settings };
+    let tree = XfmTree::new(engine.tree().file().clone(), loading(Loading::Blocking)).unwrap();
+    let mut engine = Engine::new(tree, ActiveMesh::new(), settings).unwrap();
+    let ahead = View { k: 1e15, cos_beta: 0.5, sin_beta: 0.75_f64.sqrt(), ..View::new(&path.camera(0), 1.0) };
+    let views = [DVec3::X, DVec3::Y, DVec3::Z].map(|d| [d, -d]).as_flattened().to_vec();
+    let views: Vec<View> = views.iter().map(|&direction| View { direction, ..ahead }).collect();
+    advance_settled(&mut engine, &views);
+    engine.tree().assert_well_formed();
+    let key = |mesh: &Mesh, corners: &[u32; 3]| {
+        let [a, b, c] = corners.map(|v| mesh.positions[v as usize].map(f32::to_bits));
+        [a, b, c].min([b, c, a]).min([c, a, b])
+    };
+    let keys = |mesh: &Mesh| {
+        let shown = mesh.triangles.iter().filter(|[a, b, c]| a != b && b != c && c != a);
+        let mut keys: Vec<_> = shown.map(|t| key(mesh, t)).collect();
+        keys.sort_unstable();
+        keys
+    };
+    assert!(keys(&engine.mesh().to_mesh()) == keys(&log.mesh), "{name}: fully refined it is not the input");
+}
+
+fn assert_closed(mesh: &ActiveMesh) {
+    let edges: HashSet<(u32, u32)> =
+        mesh.displayed_triangles().flat_map(|(_, [a, b, c])| [(a, b), (b, c), (c, a)]).collect();
+    assert_eq!(edges.len(), 3 * mesh.displayed());
+    assert!(edges.iter().all(|&(a, b)| edges.contains(&(b, a))), "a hole in a closed mesh");
+}
+
+fn mesh_flies(name: &str, is_manifold: bool, is_closed: bool) {
+    if let Some(mesh) = data::mesh(name) {
+        flies(name, &data::log(mesh), is_manifold, is_closed);
+    }
+}
+
+#[test]
+fn closed_scans_fly() {
+    for name in ["horse", "armadillo_100k", "lucy_100k", "turbineblade_200k"] {
+        mesh_flies(&format!("meshes/{name}.ply"), true, true);
+    }
+}
+
+#[test]
+fn the_buddha_flies() {
+    mesh_flies("meshes/happy.ply", true, true);
+}
+
+#[test]
+fn open_scans_fly() {
+    mesh_flies("meshes/bunny.ply", true, false);
+    mesh_flies("meshes/dragon.ply", true, false);
+}
+
+#[test]
+fn meshes_that_are_not_manifold_fly() {
+    mesh_flies("meshes/ogre.ply", false, false);
+    mesh_flies("meshes/beast.ply", false, false);
+}
+
+#[test]
+fn towns_fly() {
+    mesh_flies("city/denhaag01_lod2_terrain.obj", true, false);
+    mesh_flies("city/boston_blocks.obj", true, false);
+}
+
+/// Virtual merges of components are none of a manifold mesh: they are left out, and there are more roots.
+#[test]
+fn joined_components_fly_apart() {
+    let Some(mesh) = data::mesh("city/denhaag01_lod2_terrain.obj") else { return };
+    let mut options = simplify::Options::default();
+    options.merge_components = true;
+    let (log, _) = simplify::build(mesh, &options, &mut |_, _| ()).unwrap();
+    flies("joined", &log, false, false);
+}
+
+#[test]
+fn built_in_scenes_fly() {
+    for kind in [SceneKind::City, SceneKind::Alps, SceneKind::Laserscan] {
+        let mesh = Scene::new(kind).mesh(&mut |_, _| ());
+        flies(kind.name(), &data::log(mesh), false, false);
+    }
+}
+
+/// 100,000 frames, slow and fast, rests and teleports, while an I/O thread brings what it can: the blocks in memory and
+/// under way never exceed the hard quota. Quotas change as it goes; before they are lowered the front is folded.
+#[test]
+fn the_hard_quota_holds_over_100_000_frames() {
+    let Some(mesh) = data::mesh("meshes/bunny.ply") else { return };
+    let log = data::log(mesh);
+    let file = file(&Arrangement::new(&log, &options(false, true)).unwrap());
+    let all = file.resident_bytes_of_all();
+    let tree = XfmTree::new(file, loading(Loading::Background)).unwrap();
+    let mut engine = Engine::new(tree, NullSink, settings(&log.mesh, Strategy::Event)).unwrap();
+    let mut random = Random(1);
+    let mut view = View { k: 300.0, ..random_view(&mut random) };
+    let (mut misses, mut limited, mut hard) = (0, 0, 0);
+    for frame in 0..100_000 {
+        if frame % 10_000 == 0 {
+            engine.advance(&[]).unwrap();
+            engine.advance(&[]).unwrap();
+            let percent = [12, 4, 8, 2, 16][frame / 10_000 % 5];
+            hard = all * percent / 100;
+            engine.tree_mut().set_quotas(hard / 2, hard);
+            engine.advance(&[]).unwrap();
+        }
+        random_step(&mut view, &mut random);
+        let report = engine.advance(&[placed(&log.mesh, view)]).unwrap();
+        let (loaded, with_under_way) = engine.tree().block_bytes();
+        assert!(
+            loaded <= with_under_way && with_under_way <= hard,
+            "{with_under_way} of {hard}, frame {frame}"
+        );
+        misses += report.misses;
+        limited += u64::from(report.misses > 0);
+        if frame % 997 == 0 {
+            engine.tree().assert_well_formed();
+        }
+    }
+    let counts = engine.tree().counts();
+    eprintln!("{counts:?}; {misses} misses in {limited} frames");
+    assert!(counts.refused > 1000 && counts.removals > 10_000, "{counts:?}");
+}
+
+/// Bounds that are not nested over needs: what is displayed is the closure of what is wanted, with every strategy.
+#[test]
+fn forced_cuts_are_the_closure() {
+    let Some(mesh) = data::mesh("meshes/horse.ply") else { return };
+    let log = data::log(mesh);
+    let arrangement = Arrangement::new(&log, &options(false, false)).unwrap();
+    let (effective, needs) = (arrangement.effective_log(), arrangement.needs());
+    let forest = effective.forest().unwrap();
+    let file = file(&arrangement);
+    let mut oracle = OwnCut::new(&effective).oracle;
+    let strategies = [Strategy::TopDown, Strategy::Front, Strategy::Event];
+    let mut engines = strategies.map(|strategy| {
+        let tree = XfmTree::new(file.clone(), loading(Loading::Blocking)).unwrap();
+        Engine::new(tree, ActiveMesh::new(), settings(&log.mesh, strategy)).unwrap()
+    });
+    let mut random = Random(8);
+    let mut view = View { k: 300.0, ..random_view(&mut random) };
+    let (mut forced, mut changes) = (0, 0);
+    let mut stack = Vec::new();
+    for frame in 0..1500 {
+        random_step(&mut view, &mut random);
+        let views = [placed(&log.mesh, view)];
+        let mut active = oracle.cut(engines[0].settings().criterion, &views).to_vec();
+        stack.extend((0..active.len()).filter(|&n| active[n]));
+        while let Some(n) = stack.pop() {
+            for &m in needs[n].iter().chain(Some(&forest.parent[n]).filter(|&&p| p != NONE)) {
+                if !std::mem::replace(&mut active[m as usize], true) {
+                    stack.push(m as usize);
+                }
+            }
+        }
+        let numbers = (0..active.len() as u32).filter(|&n| active[n as usize]);
+        let expected = (numbers.clone().map(mix).fold(0, u64::wrapping_add), numbers.count() as u64);
+        for engine in &mut engines {
+            let report = engine.advance(&views).unwrap();
+            let name = engine.settings().strategy.name();
+            assert_eq!((report.cut_hash, report.active_nodes), expected, "{name}, frame {frame}");
+            (forced, changes) = (forced + report.forced, changes + report.unfolds);
+            if frame % 50 == 0 {
+                engine.tree().assert_well_formed();
+                assert_closed(engine.mesh());
+            }
+        }
+    }
+    eprintln!("{forced} of {changes} unfolds were forced");
+    assert!(forced > 100 && changes > 10_000);
+}
+
+/// A store that fails, brings damaged pages and is late, and quotas on top: nothing wrong is shown, and when the store
+/// has recovered the cut is what it should be.
+#[test]
+fn a_bad_store_delays_and_no_more() {
+    let Some(mesh) = data::mesh("meshes/bunny.ply") else { return };
+    let log = data::log(mesh);
+    let arrangement = Arrangement::new(&log, &options(true, true)).unwrap();
+    let mut bytes = Vec::new();
+    arrangement.write_to(&mut bytes).unwrap();
+    let mut cut = OwnCut::new(&arrangement.effective_log());
+    for (seed, how) in [(1, Loading::Background), (2, Loading::Blocking)] {
+        let source = Arc::new(Faulty::new(MemorySource::new("m", bytes.clone()), seed, Faults::default()));
+        let file = Arc::new(XfmFile::open(source.clone()).unwrap());
+        let all = file.resident_bytes_of_all();
+        let mut tree = XfmTree::new(file, loading(how)).unwrap();
+        tree.set_quotas(all / 20, u64::MAX);
+        let settings = settings(&log.mesh, Strategy::Event);
+        let mut engine = Engine::new(tree, ActiveMesh::new(), settings).unwrap();
+        let mut random = Random(seed);
+        let mut view = View { k: 300.0, ..random_view(&mut random) };
+        let delay = Duration::from_micros(100);
+        let mut faults = 0;
+        for round in 0..20 {
+            source.set(Faults { errors: 100, short: 100, flips: 100, delays: 20, delay });
+            for _ in 0..60 {
+                random_step(&mut view, &mut random);
+                faults += engine.advance(&[placed(&log.mesh, view)]).unwrap().pages.faults;
+            }
+            engine.tree().assert_well_formed();
+            source.set(Faults::default());
+            engine.tree_mut().settle().unwrap();
+            let report = advance_settled(&mut engine, &[placed(&log.mesh, view)]);
+            let found = (report.cut_hash, report.active_nodes, report.triangles);
+            assert_eq!(found, cut.find(&settings, engine.views()), "round {round}");
+        }
+        eprintln!("{faults} faults counted, {} befallen, {:?}", source.befallen(), engine.tree().counts());
+        assert!(source.befallen() > 200 && faults > 200);
+    }
+}
+
+/// With the paper's soft quota, a tenth of all blocks, along the calm paths through the built-in scenes: few blocks are
+/// loaded again within 60 frames of their removal.
+#[test]
+fn what_is_removed_is_not_wanted_again_soon() {
+    for kind in [SceneKind::City, SceneKind::Alps, SceneKind::Laserscan] {
+        let log = data::log(Scene::new(kind).mesh(&mut |_, _| ()));
+        let file = file(&Arrangement::new(&log, &options(false, true)).unwrap());
+        let paths = recorded(kind).unwrap();
+        for path in paths.iter().filter(|path| path.name.contains("calm")) {
+            let mut tree = XfmTree::new(file.clone(), loading(Loading::Blocking)).unwrap();
+            let soft = file.resident_bytes_of_all() / 10;
+            tree.set_quotas(soft, u64::MAX);
+            let mut engine = Engine::new(tree, NullSink, settings(&log.mesh, Strategy::Event)).unwrap();
+            let mut beyond = 0;
+            for frame in 0..path.frames.len() {
+                let view = View::new(&path.camera(frame), theta_of_pixels(1.0, 1080));
+                engine.advance(&[view]).unwrap();
+                beyond += usize::from(engine.tree().block_bytes().0 > soft);
+            }
+            let counts = engine.tree().counts();
+            let percent = 100.0 * counts.soon_again as f64 / counts.removals.max(1) as f64;
+            eprintln!(
+                "{}: {percent:.2} % again soon, {beyond} frames beyond the quota, {counts:?}",
+                path.name
+            );
+            assert!(percent < 5.0, "{}: {percent} % again soon; {counts:?}", path.name);
+        }
+    }
+}

@@ -1,0 +1,118 @@
+//! Files that are damaged, cut short or something else.
+
+use std::sync::Arc;
+
+use foldfront::VertexTree;
+use foldfront::vertex_tree::source::MemorySource;
+use mt_partition::{BuildOptions, MAGIC, MtError, MtFile};
+
+use crate::common::sink::StrictMesh;
+use crate::{all_around, ball_log, finest};
+
+/// A small file with several partitions, and where its nodes start.
+fn small() -> Vec<u8> {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("small.mt");
+    mt_partition::write(
+        &path,
+        &ball_log(2),
+        &BuildOptions { patch: 3.0, partition: 4, ..BuildOptions::default() },
+    )
+    .unwrap();
+    std::fs::read(&path).unwrap()
+}
+
+fn open(bytes: Vec<u8>) -> Result<MtFile, MtError> {
+    MtFile::open(Arc::new(MemorySource::new("small.mt", bytes)))
+}
+
+/// What is damaged is found: when the file is opened, or by `verify`, or at the latest when the page is read. A front over
+/// it stays coarse there, counts the fault, and nothing panics.
+#[test]
+fn any_flipped_bit_is_found() {
+    let bytes = small();
+    let intact = open(bytes.clone()).unwrap();
+    intact.verify().unwrap();
+    let (mut refused, mut coarse) = (0, 0);
+    for at in 0..bytes.len() {
+        let mut damaged = bytes.clone();
+        damaged[at] ^= 1 << (at % 8);
+        let file = match open(damaged) {
+            Err(error) => {
+                assert!(error.to_string().starts_with("small.mt"), "{error}");
+                refused += 1;
+                continue;
+            }
+            Ok(file) => Arc::new(file),
+        };
+        let error = file.verify().expect_err("a flipped bit that nobody sees");
+        assert!(error.to_string().contains("checksum"), "byte {at}: {error}");
+        if at % 7 != 0 {
+            continue;
+        }
+        let mut engine = finest(&file, StrictMesh::default());
+        let mut faults = 0;
+        for _ in 0..12 {
+            faults += engine.advance(&all_around(glam::DVec3::ZERO)).unwrap().pages.faults;
+            engine.tree_mut().settle().unwrap();
+        }
+        assert!(faults > 0, "byte {at}");
+        let displayed = engine.mesh().triangles.len();
+        assert!(displayed < 128, "byte {at}: the damaged node is displayed");
+        coarse += 1;
+    }
+    assert!(refused > 300 && coarse > 100, "{refused}, {coarse}");
+}
+
+#[test]
+fn every_truncated_file_is_refused() {
+    let bytes = small();
+    for length in 0..bytes.len() {
+        let error = open(bytes[..length].to_vec()).expect_err("cut short");
+        let is_expected = match &error {
+            MtError::NotThis { .. } => length < MAGIC.len(),
+            MtError::Length { actual, .. } => *actual == length as u64,
+            _ => false,
+        };
+        assert!(is_expected, "{length} bytes: {error}");
+    }
+    let mut longer = bytes;
+    longer.push(0);
+    assert!(matches!(open(longer), Err(MtError::Length { .. })));
+}
+
+/// Counts that ask for the world, with the checksum of the header made right again: refused before anything is allocated.
+#[test]
+fn huge_counts_are_refused() {
+    let bytes = small();
+    for at in (16..120).step_by(8) {
+        for value in [u64::MAX, u64::from(u32::MAX) - 2, 1 << 40, 0] {
+            let mut damaged = bytes.clone();
+            damaged[at..at + 8].copy_from_slice(&value.to_le_bytes());
+            if damaged == bytes {
+                continue;
+            }
+            let checksum = crc32fast::hash(&damaged[..152]);
+            damaged[152..156].copy_from_slice(&checksum.to_le_bytes());
+            // The counts that nothing is laid out by are looked at by `verify`, or are for people to read.
+            if let Ok(file) = open(damaged) {
+                let is_for_people = [16, 24, 32, 80, 88, 104, 112].contains(&at);
+                assert!(is_for_people || file.verify().is_err(), "offset {at}, {value}");
+            }
+        }
+    }
+}
+
+#[test]
+fn something_else_is_refused() {
+    let error = open(b"FFCOLLOG and so on".to_vec()).unwrap_err();
+    assert!(matches!(error, MtError::NotThis { .. }), "{error}");
+    for (offset, message) in [(8, "version 2"), (12, "attribute stride 1")] {
+        let mut other = small();
+        other[offset] += 1;
+        let error = open(other).unwrap_err();
+        assert!(error.to_string().contains(message), "{error}");
+    }
+    let missing = mt_partition::write("/nowhere/at/all.mt".as_ref(), &ball_log(1), &BuildOptions::default());
+    assert!(missing.unwrap_err().to_string().starts_with("/nowhere/at/all.mt"));
+}

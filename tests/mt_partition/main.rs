@@ -1,0 +1,106 @@
+//! The partitioned multi-triangulation: what is displayed, how it pages, and what it does with bad stores and bad files.
+
+#[path = "../common/mod.rs"]
+mod common;
+mod damage;
+mod paging;
+mod surface;
+
+use std::sync::Arc;
+
+use common::{Random, data, random_step, random_view};
+use foldfront::criterion::Criterion;
+use foldfront::engine::{Engine, Settings};
+use foldfront::vertex_tree::MeshSink;
+use foldfront::view::View;
+use foldfront::{CollapseLog, Mesh};
+use glam::DVec3;
+use mt_partition::{CacheMode, Memory, MtFile, MtTree};
+
+/// A closed surface of extent about 2: a subdivided octahedron with bumps. Each level has four times the triangles.
+fn bumpy_ball(levels: u32) -> Mesh {
+    let mut points: Vec<DVec3> = [DVec3::X, DVec3::Y, DVec3::Z].into_iter().flat_map(|p| [p, -p]).collect();
+    let mut triangles: Vec<[u32; 3]> =
+        vec![[0, 2, 4], [2, 1, 4], [1, 3, 4], [3, 0, 4], [2, 0, 5], [1, 2, 5], [3, 1, 5], [0, 3, 5]];
+    for _ in 0..levels {
+        let mut middles = std::collections::HashMap::new();
+        let mut middle = |a: u32, b: u32| {
+            *middles.entry((a.min(b), a.max(b))).or_insert_with(|| {
+                points.push((points[a as usize] + points[b as usize]).normalize());
+                points.len() as u32 - 1
+            })
+        };
+        triangles = triangles
+            .into_iter()
+            .flat_map(|[a, b, c]| {
+                let [ab, bc, ca] = [middle(a, b), middle(b, c), middle(c, a)];
+                [[a, ab, ca], [ab, b, bc], [ca, bc, c], [ab, bc, ca]]
+            })
+            .collect();
+    }
+    let bump = |p: DVec3| 1.0 + 0.05 * (17.0 * p.x).sin() * (13.0 * p.y).sin() * (11.0 * p.z).cos();
+    let positions = points.into_iter().map(|p| (p * bump(p)).as_vec3().to_array()).collect();
+    Mesh { positions, triangles }
+}
+
+fn ball_log(levels: u32) -> CollapseLog {
+    data::log(bumpy_ball(levels))
+}
+
+/// A walk around the origin that rests, hurries and teleports.
+struct Walk {
+    random: Random,
+    view: View,
+}
+
+impl Walk {
+    fn new(seed: u64, k: f64) -> Self {
+        let mut random = Random(seed);
+        Self { view: View { k, ..random_view(&mut random) }, random }
+    }
+
+    fn step(&mut self) -> [View; 1] {
+        random_step(&mut self.view, &mut self.random);
+        [self.view]
+    }
+}
+
+fn engine<M: MeshSink>(file: &Arc<MtFile>, cache: CacheMode, memory: Memory, mesh: M) -> Engine<MtTree, M> {
+    let settings = mt_partition::Settings { cache, memory, ..mt_partition::Settings::default() };
+    let tree = MtTree::new(file.clone(), settings).unwrap();
+    Engine::new(tree, mesh, Settings { rho: 0.02, ..Settings::default() }).unwrap()
+}
+
+/// Advances until nothing is missing, and says after how many frames that was.
+fn advance_settled<M: MeshSink>(engine: &mut Engine<MtTree, M>, views: &[View]) -> usize {
+    for frame in 0..2000 {
+        if engine.advance(views).unwrap().misses == 0 {
+            return frame;
+        }
+        engine.tree_mut().settle().unwrap();
+    }
+    panic!("the front never arrives");
+}
+
+use foldfront::VertexTree;
+
+/// By the size of spheres and from all around, everything is wanted, whatever its error.
+fn finest<M: MeshSink>(file: &Arc<MtFile>, mesh: M) -> Engine<MtTree, M> {
+    let tree = MtTree::new(file.clone(), mt_partition::Settings::default()).unwrap();
+    let settings = Settings { criterion: Criterion::SphereSize, ..Settings::default() };
+    Engine::new(tree, mesh, settings).unwrap()
+}
+
+/// See [`finest`].
+fn all_around(eye: DVec3) -> [View; 6] {
+    let (cos_beta, sin_beta) = (0.5, 0.75_f64.sqrt());
+    [DVec3::X, DVec3::Y, DVec3::Z, -DVec3::X, -DVec3::Y, -DVec3::Z].map(|direction| View {
+        eye,
+        direction,
+        cos_beta,
+        sin_beta,
+        k: 1e9,
+    })
+}
+
+const CRITERION: Criterion = Criterion::ScreenError;

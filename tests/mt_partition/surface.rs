@@ -1,0 +1,191 @@
+//! Every cut covers the surface once, and the finest one is the input.
+
+use std::collections::HashMap;
+use std::sync::Arc;
+
+use foldfront::engine::Engine;
+use foldfront::{Mesh, VertexTree};
+use mt_partition::{BuildOptions, CacheMode, Memory, MtFile, MtTree, QueueOrder};
+
+use crate::common::sink::StrictMesh;
+use crate::common::{Random, bumpy_grid, data, graph_cut};
+use crate::{Walk, advance_settled, all_around, ball_log, engine, finest};
+
+/// Triangles by input vertices, each starting with its least one, in ascending order.
+fn canonical(triangles: impl Iterator<Item = [u32; 3]>) -> Vec<[u32; 3]> {
+    let rotated = |t: [u32; 3]| {
+        let least = (0..3).min_by_key(|&i| t[i]).unwrap();
+        [0, 1, 2].map(|i| t[(least + i) % 3])
+    };
+    let mut all: Vec<_> = triangles.map(rotated).collect();
+    all.sort_unstable();
+    all
+}
+
+fn displayed(engine: &Engine<MtTree, StrictMesh>) -> Vec<[u32; 3]> {
+    let vertex = |slot| engine.tree().input_vertex(slot).unwrap();
+    canonical(engine.mesh().triangles.values().map(|t| t.map(vertex)))
+}
+
+fn input(mesh: &Mesh) -> Vec<[u32; 3]> {
+    let is_shown = |t: &[u32; 3]| t[0] != t[1] && t[1] != t[2] && t[2] != t[0];
+    canonical(mesh.triangles.iter().copied().filter(is_shown))
+}
+
+fn assert_finest_is_input(file: &Arc<MtFile>, mesh: &Mesh) {
+    let mut engine = finest(file, StrictMesh::default());
+    let (lo, hi) = mesh.bounding_box().unwrap_or_default();
+    let center: [f64; 3] = std::array::from_fn(|i| f64::from(lo[i] + hi[i]) / 2.0);
+    advance_settled(&mut engine, &all_around(center.into()));
+    assert!(displayed(&engine) == input(mesh), "the finest cut is not the input");
+    advance_settled(&mut engine, &[]);
+    assert_eq!(engine.mesh().triangles.len(), file.base_triangles() as usize);
+}
+
+/// How often each directed edge occurs more or less often than its opposite, by edges: the boundary with its sense. It is
+/// the same for all surfaces that cover the same ground, and empty for closed ones.
+fn boundary(triangles: &[[u32; 3]]) -> HashMap<[u32; 2], i32> {
+    let mut edges = HashMap::new();
+    for t in triangles {
+        for i in 0..3 {
+            let (a, b) = (t[i], t[(i + 1) % 3]);
+            *edges.entry([a.min(b), a.max(b)]).or_default() += if a < b { 1 } else { -1 };
+        }
+    }
+    edges.retain(|_, sum| *sum != 0);
+    edges
+}
+
+/// Edges of more than two triangles.
+fn crowded(triangles: &[[u32; 3]]) -> usize {
+    let mut edges: HashMap<[u32; 2], usize> = HashMap::new();
+    for t in triangles {
+        for i in 0..3 {
+            let (a, b) = (t[i], t[(i + 1) % 3]);
+            *edges.entry([a.min(b), a.max(b)]).or_default() += 1;
+        }
+    }
+    edges.values().filter(|&&count| count > 2).count()
+}
+
+fn options(patch: f64, partition: u32) -> BuildOptions {
+    BuildOptions { patch, partition, ..BuildOptions::default() }
+}
+
+/// Closed in every frame, with any patch and partition size; and the input again, triangle for triangle, at the end.
+#[test]
+fn every_cut_of_a_closed_surface_is_closed() {
+    let log = ball_log(4);
+    for (seed, (patch, partition)) in
+        [(0.0, 1), (0.0, 20), (4.0, 5), (10.0, 20), (1e9, 20)].into_iter().enumerate()
+    {
+        let file = graph_cut::file(&log, &options(patch, partition));
+        let mut engine = engine(&file, CacheMode::PC, Memory::default(), StrictMesh::default());
+        let mut walk = Walk::new(seed as u64, 300.0);
+        let mut sizes = Vec::new();
+        for frame in 0..300 {
+            let report = engine.advance(&walk.step()).unwrap();
+            // Frames with misses are as good as others.
+            engine.tree_mut().settle().unwrap();
+            let triangles = displayed(&engine);
+            assert_eq!(boundary(&triangles), HashMap::new(), "patch {patch}, frame {frame}");
+            assert_eq!(crowded(&triangles), 0, "patch {patch}, frame {frame}");
+            assert_eq!(report.triangles, triangles.len() as u64);
+            sizes.push(triangles.len());
+        }
+        sizes.sort_unstable();
+        sizes.dedup();
+        assert!(
+            sizes.len() > if patch > 1e6 { 1 } else { 20 },
+            "patch {patch}: the cut hardly moves: {sizes:?}"
+        );
+        assert_finest_is_input(&file, &log.mesh);
+        advance_settled(&mut engine, &[]);
+        assert_eq!(engine.mesh().triangles.len(), file.base_triangles() as usize);
+    }
+}
+
+/// A surface with a boundary keeps covering the ground that its base mesh and its input cover between them: directed
+/// edges cancel everywhere but along the boundary, which only ever goes through input vertices of the boundary.
+#[test]
+fn a_surface_with_a_boundary_has_no_other() {
+    let log = data::log(bumpy_grid(33, &mut Random(5)));
+    let rim = |v: u32| v % 33 == 0 || v % 33 == 32 || v / 33 == 0 || v / 33 == 32;
+    let file = graph_cut::file(&log, &options(10.0, 20));
+    let mut engine = engine(&file, CacheMode::PCc, Memory::default(), StrictMesh::default());
+    let mut walk = Walk::new(9, 200.0);
+    for frame in 0..400 {
+        engine.advance(&walk.step()).unwrap();
+        engine.tree_mut().settle().unwrap();
+        let open = boundary(&displayed(&engine));
+        assert!(open.keys().flatten().all(|&v| rim(v)), "frame {frame}: a crack within the surface");
+        assert!(!open.is_empty(), "frame {frame}: nothing is displayed");
+    }
+    assert_finest_is_input(&file, &log.mesh);
+}
+
+/// Every mesh that there is, whatever is wrong with it: the file verifies, the requested patches are reached, and the
+/// finest cut is the input.
+#[test]
+fn real_meshes() {
+    for name in ["bunny", "beast", "ogre", "armadillo_100k"] {
+        let Some(mesh) = data::mesh(&format!("meshes/{name}.ply")) else { return };
+        let log = data::log(mesh);
+        let file = graph_cut::file(&log, &BuildOptions::default());
+        file.verify().unwrap();
+        assert_finest_is_input(&file, &log.mesh);
+        let size = |what: &str| file.facts().iter().find(|f| f.0 == what).unwrap().1.clone();
+        eprintln!("{name}: {}; {}; {}", size("bytes"), size("triangles on arcs"), size("arcs"));
+    }
+}
+
+#[test]
+fn the_reduction_keeps_its_promises() {
+    let log = ball_log(6);
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("ball.mt");
+    for patch in [3.0, 10.0, 20.0] {
+        let report = mt_partition::write(&path, &log, &options(patch, 20)).unwrap();
+        let per_arc = report.stored_triangles as f64 / report.arcs as f64;
+        assert!(per_arc >= patch, "{report:?}");
+        assert!(report.stored_triangles < 3 * report.triangles, "{report:?}");
+        assert!(report.bytes <= 40 * report.triangles || patch < 10.0, "{report:?}");
+        assert_eq!(report.bytes, std::fs::metadata(&path).unwrap().len());
+    }
+}
+
+#[test]
+fn the_same_input_gives_the_same_bytes() {
+    let log = ball_log(4);
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("ball.mt");
+    let bytes = |options: &BuildOptions| {
+        mt_partition::write(&path, &log, options).unwrap();
+        std::fs::read(&path).unwrap()
+    };
+    let first = bytes(&BuildOptions::default());
+    assert!(first == bytes(&BuildOptions::default()));
+    let other = bytes(&BuildOptions { order: QueueOrder::Decreasing, ..BuildOptions::default() });
+    assert!(first != other, "the order of the queue makes no difference");
+}
+
+/// Nothing at all, points, one triangle, triangles without a collapse.
+#[test]
+fn next_to_nothing() {
+    let meshes = [
+        Mesh::default(),
+        Mesh { positions: vec![[0.0; 3]; 3], triangles: vec![] },
+        Mesh {
+            positions: vec![[0.0, 0.0, 0.0], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0]],
+            triangles: vec![[0, 1, 2], [1, 1, 2]],
+        },
+    ];
+    for mesh in meshes {
+        for log in [data::log(mesh.clone()), foldfront::CollapseLog { mesh: mesh.clone(), collapses: vec![] }]
+        {
+            let file = graph_cut::file(&log, &BuildOptions::default());
+            file.verify().unwrap();
+            assert_finest_is_input(&file, &mesh);
+        }
+    }
+}
