@@ -54,8 +54,8 @@ fn main() {
         for n in 0..FRAMES {
             let frame = (2 * n + 1) * path.frames.len() / (2 * FRAMES);
             let camera = path.camera(frame);
-            let engine = subject.frame(&path, frame, &options).expect("nothing can fail in memory");
-            let adaptive = reference.deviation(&engine.mesh().to_mesh(), &camera, LINES);
+            let mesh = subject.frame(&path, frame, &options).expect("nothing can fail in memory");
+            let adaptive = reference.deviation(&mesh, &camera, LINES);
             // The coarsest uniform cut that is no worse, to 2 % of its error.
             let (mut fine, mut coarse) = (log.mesh.extent() * 1e-7, log.mesh.extent() * 1e-2);
             let mut triangles = None;

@@ -1,4 +1,7 @@
-//! The experiment runner: one hierarchy, one path, every strategy.
+//! The experiment runner: one hierarchy, in whatever backend, one path, every strategy.
+//!
+//! Replays are *settled*: a backend that pages is waited for within each change, so that cuts can be compared frame by
+//! frame; what remains is what it can not do in the memory that it has.
 //!
 //! Each strategy replays the path alone, from the base mesh on, with the displayed mesh kept as a renderer would;
 //! nothing else runs between its frames, and the first frame, which unfolds the whole cut, counts like any other.
@@ -10,10 +13,14 @@ pub mod csv;
 use std::ops::Range;
 use std::sync::Arc;
 
+use detail_block::XfmTree;
 use in_memory::{Hierarchy, InMemoryTree};
-use vertex_tree::{CollapseLog, LogError, NullSink, TreeError};
+use meta_node::{Dependencies, MetaNodeTree};
+use mt_partition::{CacheMode, Memory, MtTree};
+use vertex_tree::{CollapseLog, LogError, Mesh, NullSink, TreeError, VertexTree};
 
 use crate::active_mesh::ActiveMesh;
+use crate::brute_force::{BruteForce, unfold_all};
 use crate::budget::{Budget, WorkCap};
 use crate::criterion::Criterion;
 use crate::engine::{Engine, FrameReport, Settings};
@@ -22,6 +29,8 @@ use crate::oracle::{Difference, Oracle};
 use crate::path::Path;
 use crate::progress::Progress;
 use crate::refine::Strategy;
+use crate::settled::Settled;
+use crate::store::{Backend, Store, StoreError};
 use crate::view::{View, theta_of_pixels};
 
 /// What to replay, and how.
@@ -43,6 +52,29 @@ pub struct Options {
     pub omega: Option<f64>,
     /// Compare every frame of every exact strategy with the oracle.
     pub check: bool,
+    /// What backends may use.
+    pub paging: Paging,
+}
+
+/// What a backend that pages may use, and how.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Paging {
+    /// Bytes of pages in memory that are never exceeded.
+    pub page_memory: u64,
+    /// For detail blocks: bytes beyond which those are removed that have not been used for long.
+    pub soft_quota: u64,
+    /// For multi-triangulations: what is read at once, and what is kept.
+    pub cache: CacheMode,
+    /// For meta-nodes: what is done about neighbours that are too coarse or too fine.
+    pub dependencies: Dependencies,
+}
+
+impl Default for Paging {
+    /// Memory for everything.
+    fn default() -> Self {
+        let (cache, dependencies) = (CacheMode::default(), Dependencies::default());
+        Self { page_memory: u64::MAX, soft_quota: u64::MAX, cache, dependencies }
+    }
 }
 
 impl Default for Options {
@@ -57,6 +89,7 @@ impl Default for Options {
             rho: None,
             omega: None,
             check: false,
+            paging: Paging::default(),
         }
     }
 }
@@ -102,6 +135,32 @@ pub enum CompareError {
         scene: String,
         /// What does not fit.
         source: LogError,
+    },
+    /// A tree can not be opened.
+    #[error("{scene}: {source}")]
+    Store {
+        /// What was looked at.
+        scene: String,
+        /// Why.
+        source: StoreError,
+    },
+    /// A strategy's cut is not that of brute force over the backend's own nodes.
+    #[error(
+        "{scene}, path {path}, frame {frame}: {strategy} over {backend} differs from brute force in {wrong} nodes"
+    )]
+    Differs {
+        /// What was looked at.
+        scene: String,
+        /// The path.
+        path: String,
+        /// Number of the frame in the path.
+        frame: usize,
+        /// The strategy.
+        strategy: &'static str,
+        /// The backend.
+        backend: &'static str,
+        /// How many nodes.
+        wrong: u64,
     },
     /// The backend can not go on.
     #[error("{scene}: {source}")]
@@ -159,60 +218,142 @@ impl std::fmt::Display for WrongCut {
 /// A hierarchy with what is needed to replay paths through it.
 pub struct Subject {
     name: String,
-    hierarchy: Arc<Hierarchy>,
-    oracle: Oracle,
+    store: Store,
+    /// What cuts are checked with, once that is asked for.
+    check: Option<Check>,
+}
+
+/// Brute force, over the collapse log or over a backend's own nodes.
+enum Check {
+    Log(Oracle),
+    Nodes(BruteForce),
+}
+
+/// Calls a generic function with a way to open trees of the subject's backend, settled.
+macro_rules! with_trees {
+    ($subject:expr, $paging:expr, |$open:ident| $body:expr) => {{
+        let (subject, paging): (&Subject, Paging) = ($subject, $paging);
+        match &subject.store {
+            Store::InMemory(hierarchy, _) => {
+                let $open = || Ok(InMemoryTree::new(hierarchy.clone()));
+                $body
+            }
+            Store::MetaNode(file) => {
+                let Paging { page_memory, dependencies, .. } = paging;
+                let settings = meta_node::Settings { page_memory, dependencies, ..Default::default() };
+                let $open = || {
+                    let tree = MetaNodeTree::new(file.clone(), settings);
+                    tree.map(Settled).map_err(|e| subject.store_error(e.into()))
+                };
+                $body
+            }
+            Store::DetailBlock(file) => {
+                let (soft_quota, hard_quota) =
+                    (paging.soft_quota.min(paging.page_memory), paging.page_memory);
+                let settings = detail_block::Settings { soft_quota, hard_quota, ..Default::default() };
+                let $open = || {
+                    let tree = XfmTree::new(file.clone(), settings);
+                    tree.map(Settled).map_err(|e| subject.store_error(e.into()))
+                };
+                $body
+            }
+            Store::MtPartition(file) => {
+                let $open = || {
+                    let memory = Memory::new(paging.page_memory);
+                    let settings = mt_partition::Settings { cache: paging.cache, memory, reader: None };
+                    let tree = MtTree::new(file.clone(), settings);
+                    tree.map(Settled).map_err(|e| subject.store_error(e.into()))
+                };
+                $body
+            }
+        }
+    }};
 }
 
 impl Subject {
-    /// Arranges a log for replays.
+    /// Arranges a log for replays with the in-memory tree.
     ///
     /// # Errors
     /// [`CompareError::Log`].
     pub fn new(name: &str, log: &CollapseLog) -> Result<Self, CompareError> {
         let wrap = |source| CompareError::Log { scene: name.to_owned(), source };
-        Ok(Self {
-            name: name.to_owned(),
-            hierarchy: Arc::new(Hierarchy::new(log).map_err(wrap)?),
-            oracle: Oracle::new(log).map_err(wrap)?,
-        })
+        let hierarchy = Arc::new(Hierarchy::new(log).map_err(wrap)?);
+        let check = Some(Check::Log(Oracle::new(log).map_err(wrap)?));
+        Ok(Self { name: name.to_owned(), store: Store::InMemory(hierarchy, Arc::new(log.clone())), check })
     }
 
-    fn engine<M: vertex_tree::MeshSink>(
-        &self,
-        settings: Settings,
-        sink: impl FnOnce(&InMemoryTree) -> M,
-    ) -> Result<Engine<InMemoryTree, M>, CompareError> {
-        let tree = InMemoryTree::new(self.hierarchy.clone());
-        let mesh = sink(&tree);
-        Engine::new(tree, mesh, settings).map_err(|source| self.tree_error(source))
+    /// Replays through what has been opened.
+    #[must_use]
+    pub fn of_store(name: &str, store: Store) -> Self {
+        Self { name: name.to_owned(), store, check: None }
+    }
+
+    /// Where the hierarchy is kept.
+    #[must_use]
+    pub fn backend(&self) -> Backend {
+        self.store.backend()
+    }
+
+    fn store_error(&self, source: StoreError) -> CompareError {
+        CompareError::Store { scene: self.name.clone(), source }
     }
 
     fn tree_error(&self, source: TreeError) -> CompareError {
         CompareError::Tree { scene: self.name.clone(), source }
     }
 
-    /// The displayed mesh of one frame, with the engine that has it.
+    /// The displayed mesh of one frame.
     ///
     /// # Errors
-    /// [`CompareError::Tree`].
-    pub fn frame(
-        &self,
-        path: &Path,
-        frame: usize,
-        options: &Options,
-    ) -> Result<Engine<InMemoryTree, ActiveMesh>, CompareError> {
-        let settings =
-            Settings { strategy: Strategy::TopDown, criterion: options.criterion, ..Settings::default() };
-        let mut engine = self.engine(settings, |_| ActiveMesh::new())?;
+    /// [`CompareError::Store`], [`CompareError::Tree`].
+    pub fn frame(&self, path: &Path, frame: usize, options: &Options) -> Result<Mesh, CompareError> {
+        let strategy = Strategy::TopDown;
+        let settings = Settings { strategy, criterion: options.criterion, ..Settings::default() };
         let view = View::new(&path.camera(frame), options.theta);
-        engine.advance(&[view]).map_err(|source| self.tree_error(source))?;
-        Ok(engine)
+        with_trees!(self, options.paging, |open| {
+            let mut engine =
+                Engine::new(open()?, ActiveMesh::new(), settings).map_err(|e| self.tree_error(e))?;
+            engine.advance(&[view]).map_err(|e| self.tree_error(e))?;
+            Ok(engine.mesh().to_mesh())
+        })
+    }
+
+    /// The mesh with everything unfolded: the input, as the backend gives it back.
+    ///
+    /// # Errors
+    /// [`CompareError::Store`], [`CompareError::Tree`].
+    pub fn finest(&self) -> Result<Mesh, CompareError> {
+        if let Store::InMemory(_, log) = &self.store {
+            return Ok(log.mesh.clone());
+        }
+        let mut mesh = ActiveMesh::new();
+        with_trees!(self, Paging::default(), |open| {
+            let mut tree = open()?;
+            tree.base_mesh(&mut mesh).map_err(|e| self.tree_error(e))?;
+            unfold_all(&mut tree, &mut mesh, |_, _| {}).map_err(|e| self.tree_error(e))?;
+        });
+        Ok(mesh.to_mesh())
+    }
+
+    fn new_check(&self) -> Result<Check, CompareError> {
+        if let Store::InMemory(_, log) = &self.store {
+            let oracle = Oracle::new(log);
+            return oracle
+                .map(Check::Log)
+                .map_err(|source| CompareError::Log { scene: self.name.clone(), source });
+        }
+        with_trees!(self, Paging::default(), |open| {
+            let mut tree = open()?;
+            tree.base_mesh(&mut NullSink).map_err(|e| self.tree_error(e))?;
+            BruteForce::new(&mut tree).map(Check::Nodes).map_err(|e| self.tree_error(e))
+        })
     }
 
     /// Replays `frames` of a path with every strategy of the options. `progress` counts frames.
     ///
     /// # Errors
-    /// [`CompareError::Tree`], and [`CompareError::Wrong`] where the options ask for a check.
+    /// [`CompareError::Store`], [`CompareError::Tree`], and [`CompareError::Wrong`] or [`CompareError::Differs`] where the
+    /// options ask for a check.
     pub fn replay(
         &mut self,
         path: &Path,
@@ -220,13 +361,21 @@ impl Subject {
         options: &Options,
         progress: Progress,
     ) -> Result<Vec<Run>, CompareError> {
+        let is_checked = |s: Strategy| options.check || !s.is_exact();
+        let mut check = self.check.take();
+        if check.is_none() && options.strategies.iter().any(|&s| is_checked(s)) {
+            check = Some(self.new_check()?);
+        }
         let speed = declared_speed(path, options);
         let views: Vec<View> =
             frames.clone().map(|frame| View::new(&path.camera(frame), options.theta)).collect();
-        let is_checked = |s: Strategy| options.check || !s.is_exact();
         let replays = options.strategies.iter().map(|&s| 1 + usize::from(is_checked(s))).sum::<usize>();
         let total = (replays * views.len()) as u64;
         let mut done = 0;
+        let mut count = || {
+            done += 1;
+            progress(done, total);
+        };
 
         let mut runs: Vec<Run> = Vec::new();
         for &strategy in &options.strategies {
@@ -238,51 +387,96 @@ impl Subject {
                 budget: options.budget,
                 work_cap: options.work_cap,
             };
-            let mut engine = self.engine(settings, |_| ActiveMesh::new())?;
-            let mut rows = Vec::with_capacity(views.len());
-            for (frame, view) in frames.clone().zip(&views) {
-                let report = engine.advance(std::slice::from_ref(view)).map_err(|e| self.tree_error(e))?;
-                engine.mesh_mut().clear_changes();
-                rows.push(Row { frame, report, wrong: None });
-                done += 1;
-                progress(done, total);
-            }
-            drop(engine);
-            if is_checked(strategy) {
-                let mut engine = self.engine(settings, |_| NullSink)?;
-                for (row, view) in rows.iter_mut().zip(&views) {
-                    let report =
-                        engine.advance(std::slice::from_ref(view)).map_err(|e| self.tree_error(e))?;
-                    let difference = self.oracle.compare(&engine);
-                    row.wrong = Some(difference.map_or(0, |d| d.count as u64));
-                    // What is carried over is not wrong, it is late.
-                    let is_exact = strategy.is_exact() && report.carried == 0;
-                    if let Some(difference) = difference.filter(|_| is_exact) {
-                        return Err(CompareError::Wrong(Box::new(WrongCut {
-                            scene: self.name.clone(),
-                            path: path.name.clone(),
-                            frame: row.frame,
-                            strategy,
-                            difference,
-                            views: engine.views().to_vec(),
-                            criterion: options.criterion,
-                        })));
-                    }
-                    done += 1;
-                    progress(done, total);
+            let replay = Replay { subject: self, path, frames: frames.clone(), views: &views, settings };
+            let rows = with_trees!(self, options.paging, |open| {
+                let mut rows = replay.measure(open()?, &mut count)?;
+                if let Some(check) = check.as_mut().filter(|_| is_checked(strategy)) {
+                    replay.check(open()?, check, &mut rows, &mut count)?;
                 }
-            }
+                rows
+            });
             runs.push(Run {
                 scene: self.name.clone(),
                 path: path.name.clone(),
-                backend: "in-memory",
+                backend: self.backend().name(),
                 strategy,
-                prefetch: "none",
+                prefetch: if self.backend() == Backend::InMemory { "none" } else { "paper" },
                 speed,
                 rows,
             });
         }
+        self.check = check;
         Ok(runs)
+    }
+}
+
+/// One strategy along one path.
+struct Replay<'a> {
+    subject: &'a Subject,
+    path: &'a Path,
+    frames: Range<usize>,
+    views: &'a [View],
+    settings: Settings,
+}
+
+impl Replay<'_> {
+    fn measure<T: VertexTree>(&self, tree: T, count: &mut impl FnMut()) -> Result<Vec<Row>, CompareError> {
+        let wrap = |e| self.subject.tree_error(e);
+        let mut engine = Engine::new(tree, ActiveMesh::new(), self.settings).map_err(wrap)?;
+        let mut rows = Vec::with_capacity(self.views.len());
+        for (frame, view) in self.frames.clone().zip(self.views) {
+            let report = engine.advance(std::slice::from_ref(view)).map_err(wrap)?;
+            engine.mesh_mut().clear_changes();
+            rows.push(Row { frame, report, wrong: None });
+            count();
+        }
+        Ok(rows)
+    }
+
+    fn check<T: VertexTree>(
+        &self,
+        tree: T,
+        check: &mut Check,
+        rows: &mut [Row],
+        count: &mut impl FnMut(),
+    ) -> Result<(), CompareError> {
+        let wrap = |e| self.subject.tree_error(e);
+        let mut engine = Engine::new(tree, NullSink, self.settings).map_err(wrap)?;
+        for (row, view) in rows.iter_mut().zip(self.views) {
+            let report = engine.advance(std::slice::from_ref(view)).map_err(wrap)?;
+            // What is carried over, blocked or has no room is not wrong, it is late.
+            let is_late = report.carried + report.blocked + report.misses > 0;
+            let is_exact = self.settings.strategy.is_exact() && !is_late;
+            let (scene, path) = (self.subject.name.clone(), self.path.name.clone());
+            match check {
+                Check::Log(oracle) => {
+                    let difference = oracle.compare(&engine);
+                    row.wrong = Some(difference.map_or(0, |d| d.count as u64));
+                    if let Some(difference) = difference.filter(|_| is_exact) {
+                        return Err(CompareError::Wrong(Box::new(WrongCut {
+                            scene,
+                            path,
+                            frame: row.frame,
+                            strategy: self.settings.strategy,
+                            difference,
+                            views: engine.views().to_vec(),
+                            criterion: self.settings.criterion,
+                        })));
+                    }
+                }
+                Check::Nodes(brute_force) => {
+                    let wrong = brute_force.wrong(&engine);
+                    row.wrong = Some(wrong);
+                    if wrong > 0 && is_exact {
+                        let (frame, strategy) = (row.frame, self.settings.strategy.name());
+                        let backend = self.subject.backend().name();
+                        return Err(CompareError::Differs { scene, path, frame, strategy, backend, wrong });
+                    }
+                }
+            }
+            count();
+        }
+        Ok(())
     }
 }
 

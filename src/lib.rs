@@ -59,6 +59,7 @@
 //! the [`VertexTree`] trait, the [`engine`] with its [`front`], and the displayed mesh ([`active_mesh`]).
 
 pub mod active_mesh;
+pub mod brute_force;
 pub mod budget;
 pub mod bvh;
 #[cfg(feature = "cli")]
@@ -88,7 +89,10 @@ pub mod render;
 #[cfg(feature = "cli")]
 pub mod report;
 pub mod scene;
+pub mod settled;
 pub mod simplify;
+#[cfg(feature = "cli")]
+pub mod store;
 pub mod view;
 
 #[cfg(feature = "detail-block")]

@@ -33,8 +33,8 @@ fn nominal_is_measured(mesh: &str, trajectory: &str, mode: Mode, frames: usize) 
     for n in 0..frames {
         let frame = (2 * n + 1) * path.frames.len() / (2 * frames);
         let camera = path.camera(frame);
-        let engine = subject.frame(&path, frame, &options).unwrap();
-        let adaptive = reference.deviation(&engine.mesh().to_mesh(), &camera, LINES);
+        let mesh = subject.frame(&path, frame, &options).unwrap();
+        let adaptive = reference.deviation(&mesh, &camera, LINES);
         let (forward, reverse) = (adaptive.forward.inner, adaptive.reverse.inner);
         assert!(forward.count > 1000 && reverse.count > 1000, "frame {frame} shows nothing: {adaptive}");
         let p99 = forward.p99.max(reverse.p99);

@@ -5,11 +5,14 @@ use std::path::PathBuf;
 use std::time::Duration;
 
 use clap::{Args, Parser, Subcommand, ValueEnum};
+use meta_node::Dependencies;
+use mt_partition::CacheMode;
 
 use crate::budget::WorkCap;
 use crate::criterion::Criterion;
 use crate::path::import;
 use crate::refine::Strategy;
+use crate::store::{Backend, BuildOptions};
 
 /// Event-driven view-dependent level of detail: build hierarchies, replay walkthroughs, compare strategies.
 #[derive(Debug, Parser)]
@@ -39,19 +42,13 @@ pub(super) enum Command {
     Deviation(Deviation),
 }
 
-#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
-pub(super) enum Backend {
-    /// The whole hierarchy resident.
-    InMemory,
-}
-
 #[derive(Debug, Args)]
 pub(super) struct Build {
     /// Mesh files (.obj .ply .stl .off), heights (.hgt, several are one mosaic; .png .tif), or scene:NAME.
     #[arg(required = true)]
     pub input: Vec<String>,
     /// How the hierarchy will be stored.
-    #[arg(long, value_enum, default_value = "in-memory")]
+    #[arg(long, default_value = "in-memory", value_parser = backend)]
     pub backend: Backend,
     /// The file to write.
     #[arg(short, long)]
@@ -59,6 +56,31 @@ pub(super) struct Build {
     /// Also merge near vertices of different components, so that many objects end in few roots.
     #[arg(long)]
     pub merge_components: bool,
+    #[command(flatten)]
+    pub storage: Storage,
+}
+
+/// How a backend arranges a hierarchy.
+#[derive(Debug, Args)]
+pub(super) struct Storage {
+    /// Levels of the tree in a meta-node [default: fitted to a page] or in a detail block [default: 4].
+    #[arg(long, value_name = "L", value_parser = clap::value_parser!(u32).range(1..=16))]
+    pub levels: Option<u32>,
+    /// Quantise the nodes of detail blocks.
+    #[arg(long)]
+    pub quantize: bool,
+    /// Triangles on an arc of a multi-triangulation, on average [default: 10].
+    #[arg(long, value_name = "N", value_parser = positive)]
+    pub patch: Option<f64>,
+    /// Most nodes in a partition of a multi-triangulation [default: 20].
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..))]
+    pub partition: Option<u32>,
+}
+
+impl From<&Storage> for BuildOptions {
+    fn from(s: &Storage) -> Self {
+        Self { levels: s.levels, quantize: s.quantize, patch: s.patch, partition: s.partition }
+    }
 }
 
 #[derive(Debug, Args)]
@@ -129,9 +151,24 @@ pub(super) struct Compare {
     /// top-down, front, event, event-published; by default all.
     #[arg(long, value_delimiter = ',', value_name = "LIST", value_parser = strategy)]
     pub strategy: Vec<Strategy>,
-    /// Where hierarchies are kept.
-    #[arg(long, value_delimiter = ',', value_name = "LIST", value_enum)]
+    /// in-memory, meta-node, detail-block, mt-partition: where inputs are kept, each built on the fly; by default
+    /// in-memory, and for what `build` wrote, what it was built for.
+    #[arg(long, value_delimiter = ',', value_name = "LIST", value_parser = backend)]
     pub backend: Vec<Backend>,
+    #[command(flatten)]
+    pub storage: Storage,
+    /// Memory for pages that a backend never exceeds, such as 64M; by default no limit.
+    #[arg(long, value_name = "SIZE", value_parser = size)]
+    pub page_memory: Option<u64>,
+    /// Memory beyond which detail blocks that have not been used for long are removed; by default no limit.
+    #[arg(long, value_name = "SIZE", value_parser = size)]
+    pub soft_quota: Option<u64>,
+    /// np-nc, p-nc, p-cc, p-c (Holst & Schumann), p-status: what a multi-triangulation reads at once and keeps.
+    #[arg(long, value_name = "MODE", default_value = "p-c", value_parser = cache)]
+    pub cache: CacheMode,
+    /// What meta-nodes make of neighbours that are too coarse or too fine for a change.
+    #[arg(long, value_enum, default_value = "off")]
+    pub dependencies: DependencyRule,
     #[command(flatten)]
     pub refinement: Refinement,
     /// Steer the tolerance so that no more triangles are displayed.
@@ -155,6 +192,26 @@ pub(super) struct Compare {
     /// Folder for the results.
     #[arg(long, default_value = "compare-out")]
     pub out: PathBuf,
+}
+
+#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
+pub(super) enum DependencyRule {
+    /// They change first.
+    Force,
+    /// The change is refused, as in the paper.
+    Block,
+    /// Nothing: spheres and errors are nested over all dependencies.
+    Off,
+}
+
+impl From<DependencyRule> for Dependencies {
+    fn from(rule: DependencyRule) -> Self {
+        match rule {
+            DependencyRule::Force => Self::Force,
+            DependencyRule::Block => Self::Block,
+            DependencyRule::Off => Self::Off,
+        }
+    }
 }
 
 #[derive(Debug, Args)]
@@ -318,6 +375,26 @@ fn duration(text: &str) -> Result<Duration, String> {
     }
 }
 
+fn backend(text: &str) -> Result<Backend, String> {
+    let names = || format!("one of {} is expected", Backend::ALL.map(Backend::name).join(", "));
+    Backend::ALL.into_iter().find(|b| b.name() == text).ok_or_else(names)
+}
+
+fn cache(text: &str) -> Result<CacheMode, String> {
+    let names = || format!("one of {} is expected", CacheMode::ALL.map(CacheMode::name).join(", "));
+    CacheMode::ALL.into_iter().find(|mode| mode.name() == text).ok_or_else(names)
+}
+
+/// Bytes, or a number with the unit K, M or G of 1024 each.
+fn size(text: &str) -> Result<u64, String> {
+    let (number, shift) = [("K", 10), ("M", 20), ("G", 30)]
+        .iter()
+        .find_map(|&(unit, shift)| Some((text.strip_suffix(unit)?, shift)))
+        .unwrap_or((text, 0));
+    let bytes = number.parse::<u64>().ok().and_then(|n| n.checked_mul(1 << shift));
+    bytes.filter(|&n| n > 0).ok_or_else(|| "a size such as 65536, 64K, 256M or 1G is expected".to_owned())
+}
+
 /// A number of changes, or a time.
 fn work_cap(text: &str) -> Result<WorkCap, String> {
     let expected = |_| "a number of changes, or a time such as 200us, is expected".to_owned();
@@ -349,6 +426,12 @@ mod tests {
         assert_eq!(work_cap("100"), Ok(WorkCap::Changes(100)));
         assert_eq!(work_cap("200us"), Ok(WorkCap::Time(Duration::from_micros(200))));
         assert!(work_cap("-1").is_err());
+        assert_eq!(size("65536"), Ok(65536));
+        assert_eq!(size("64K"), Ok(65536));
+        assert_eq!(size("1G"), Ok(1 << 30));
+        assert!(size("1T").is_err() && size("0").is_err() && size("99999999999G").is_err());
+        assert_eq!(backend("meta-node"), Ok(Backend::MetaNode));
+        assert_eq!(cache("p-cc"), Ok(CacheMode::PCc));
         assert!(positive("NaN").is_err());
         assert_eq!(strategy("event"), Ok(Strategy::Event));
         assert!(strategy("best").is_err());

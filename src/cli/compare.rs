@@ -3,19 +3,20 @@
 use std::path::Path as FilePath;
 
 use anyhow::{Context, Result, bail};
-use vertex_tree::CollapseLog;
+use vertex_tree::Mesh;
 
 use super::arguments::Compare;
-use super::input::Input;
+use super::input::{Input, Replayable};
 use super::print;
 use super::progress::stage;
 use crate::budget::Budget;
-use crate::compare::{Options, Run, Subject, csv};
+use crate::compare::{Options, Paging, Run, Subject, csv};
 use crate::path::{self, Path};
 use crate::refine::Strategy;
 use crate::render::{self, Image, Style};
 use crate::report::{Picture, Report, Section};
 use crate::scene::{Scene, SceneKind};
+use crate::store::BuildOptions;
 use crate::{output, simplify};
 
 pub(super) fn compare(command: &Compare) -> Result<()> {
@@ -32,7 +33,13 @@ pub(super) fn compare(command: &Compare) -> Result<()> {
     let arguments: Vec<String> = std::env::args().skip(1).collect();
     let mut report = Report { command: format!("foldfront {}", arguments.join(" ")), sections: Vec::new() };
     for (input, name) in inputs.iter().zip(unique_names(&inputs)) {
-        report.sections.push(section(command, input, name, &paths, &options)?);
+        for subject in input.replayable(&command.backend, &BuildOptions::from(&command.storage))? {
+            let name = match (&command.backend[..], subject.subject.backend()) {
+                ([] | [_], _) => name.clone(),
+                (_, backend) => format!("{name}-{}", backend.name()),
+            };
+            report.sections.push(section(command, input, name, subject, &paths, &options)?);
+        }
     }
     let file = command.out.join("report.html");
     let mut pages = vec![(file.clone(), report.to_html()?)];
@@ -55,16 +62,16 @@ fn section(
     command: &Compare,
     input: &Input,
     name: String,
+    subject: Replayable,
     paths: &[Path],
     options: &Options,
 ) -> Result<Section> {
-    let (log, built) = input.log(false)?;
+    let Replayable { mut subject, built, facts: stored, mesh, folder: _folder } = subject;
     let walks = match (paths, input) {
         ([], Input::Scene(scene)) => path::recorded(scene.kind())?.to_vec(),
-        ([], _) => vec![path::around(&log.mesh)],
+        ([], _) => vec![path::around(&mesh)],
         (paths, _) => paths.to_vec(),
     };
-    let mut subject = Subject::new(&name, &log)?;
     let mut runs = Vec::new();
     let mut pictures = Vec::new();
     for walk in &walks {
@@ -79,7 +86,9 @@ fn section(
         pictures.extend(stage(&format!("{name}: pictures"), |_| draw(&subject, walk, frame, options))?);
         runs.extend(replayed);
     }
-    Ok(Section { name, facts: facts(&log, built.as_ref()), runs, pictures })
+    let mut facts = facts(&mesh, built.as_ref());
+    facts.extend(stored);
+    Ok(Section { name, facts, runs, pictures })
 }
 
 /// The frame with the most active nodes: the one that shows most.
@@ -89,8 +98,7 @@ fn most_complex(run: &Run) -> usize {
 
 /// A frame from the camera and from outside.
 fn draw(subject: &Subject, walk: &Path, frame: usize, options: &Options) -> Result<[Picture; 2]> {
-    let engine = subject.frame(walk, frame, options)?;
-    let mesh = engine.mesh().to_mesh();
+    let mesh = subject.frame(walk, frame, options)?;
     let camera = walk.camera(frame);
     let style = Style { width: 960, ..Style::default() };
     let picture = |what: &str, image: Image| -> Result<Picture> {
@@ -104,14 +112,14 @@ fn draw(subject: &Subject, walk: &Path, frame: usize, options: &Options) -> Resu
     ])
 }
 
-fn facts(log: &CollapseLog, built: Option<&simplify::Report>) -> Vec<(&'static str, String)> {
+fn facts(mesh: &Mesh, built: Option<&simplify::Report>) -> Vec<(&'static str, String)> {
     let mut facts = vec![
-        ("triangles", log.mesh.triangles.len().to_string()),
-        ("vertices", log.mesh.positions.len().to_string()),
-        ("collapses", log.collapses.len().to_string()),
-        ("extent", format!("{:.4}", log.mesh.extent())),
+        ("triangles", mesh.triangles.len().to_string()),
+        ("vertices", mesh.positions.len().to_string()),
+        ("extent", format!("{:.4}", mesh.extent())),
     ];
     if let Some(built) = built {
+        facts.push(("collapses", built.collapses.to_string()));
         let time = (built.preparation + built.simplification + built.conclusion).as_secs_f64();
         let per_triangle = time * 1e6 / built.triangles.max(1) as f64;
         facts.push(("roots", built.roots.to_string()));
@@ -159,5 +167,11 @@ fn options(command: &Compare) -> Options {
         rho: command.rho,
         omega: command.omega,
         check: command.check,
+        paging: Paging {
+            page_memory: command.page_memory.unwrap_or(u64::MAX),
+            soft_quota: command.soft_quota.unwrap_or(u64::MAX),
+            cache: command.cache,
+            dependencies: command.dependencies.into(),
+        },
     }
 }

@@ -2,17 +2,18 @@
 
 use std::fmt::Write;
 
-use anyhow::{Result, bail};
+use anyhow::{Context, Result, bail};
 use vertex_tree::Mesh;
 
 use super::arguments::{Deviation, Export, LINES, Refinement, Render};
-use super::input::Input;
+use super::input::{Input, Replayable};
 use super::print;
 use super::progress::stage;
-use crate::compare::{Options, Subject};
+use crate::compare::Options;
 use crate::deviation::Reference;
 use crate::path::Path;
 use crate::render::{self, Style};
+use crate::store::BuildOptions;
 use crate::view::Camera;
 
 fn options(refinement: &Refinement) -> Options {
@@ -26,15 +27,19 @@ fn check_frame(path: &Path, frame: usize) -> Result<()> {
     Ok(())
 }
 
+/// The one thing that the arguments name.
+fn subject(arguments: &[String]) -> Result<Replayable> {
+    let mut all = Input::one(arguments)?.replayable(&[], &BuildOptions::default())?;
+    all.pop().context("one backend is one subject")
+}
+
 /// The refined mesh of a frame, and its camera.
 fn frame_mesh(frame: &super::arguments::FrameOf) -> Result<(Mesh, Camera)> {
     let path = Path::read(&frame.path)?;
     check_frame(&path, frame.frame)?;
-    let input = Input::one(&frame.file)?;
-    let (log, _) = input.log(false)?;
-    let subject = Subject::new(&input.name(), &log)?;
-    let engine = subject.frame(&path, frame.frame, &options(&frame.refinement))?;
-    Ok((engine.mesh().to_mesh(), path.camera(frame.frame)))
+    let subject = subject(&frame.file)?.subject;
+    let mesh = subject.frame(&path, frame.frame, &options(&frame.refinement))?;
+    Ok((mesh, path.camera(frame.frame)))
 }
 
 pub(super) fn export(command: &Export) -> Result<()> {
@@ -62,21 +67,19 @@ pub(super) fn deviation(command: &Deviation) -> Result<()> {
     for &frame in &command.frames {
         check_frame(&path, frame)?;
     }
-    let input = Input::one(&command.file)?;
-    let (log, _) = input.log(false)?;
+    let Replayable { subject, mesh, .. } = subject(&command.file)?;
     let against = match command.against.as_slice() {
         [] => None,
         arguments => Some(Input::one(arguments)?.mesh()?),
     };
-    let subject = Subject::new(&input.name(), &log)?;
-    let reference = Reference::new(against.as_ref().unwrap_or(&log.mesh));
+    let reference = Reference::new(against.as_ref().unwrap_or(&mesh));
     let options = options(&command.refinement);
     let mut text = String::new();
     let mut values = Vec::new();
     for &frame in &command.frames {
-        let measured = stage(&format!("{}: measuring frame {frame}", input.name()), |_| {
-            let engine = subject.frame(&path, frame, &options)?;
-            anyhow::Ok(reference.deviation(&engine.mesh().to_mesh(), &path.camera(frame), LINES))
+        let measured = stage(&format!("measuring frame {frame}"), |_| {
+            let mesh = subject.frame(&path, frame, &options)?;
+            anyhow::Ok(reference.deviation(&mesh, &path.camera(frame), LINES))
         })?;
         let mut value = measured.to_json();
         value["frame"] = frame.into();

@@ -4,24 +4,23 @@ use std::fmt::Write;
 
 use anyhow::{Context, Result};
 use serde_json::json;
-use vertex_tree::{CollapseLog, read_log, write_log};
+use vertex_tree::{CollapseLog, read_log};
 
-use super::arguments::{Backend, Build, Info, Verify};
+use super::arguments::{Build, Info, Verify};
 use super::input::Input;
 use super::print;
 use super::progress::stage;
 use crate::simplify;
+use crate::store::{self, BuildOptions, Store};
 
 pub(super) fn build(command: &Build) -> Result<()> {
     let input = Input::one(&command.input)?;
     super::check_writable(&command.output)?;
     let (log, report) = input.log(command.merge_components)?;
-    match command.backend {
-        // The log is all that the in-memory tree needs.
-        Backend::InMemory => {
-            stage(&format!("{}: writing", input.name()), |_| write_log(&command.output, &log))?;
-        }
-    }
+    let options = BuildOptions::from(&command.storage);
+    stage(&format!("{}: writing", input.name()), |_| {
+        store::write(command.backend, &command.output, &log, &options)
+    })?;
     if let Some(report) = report {
         print(&describe(&report))?;
     }
@@ -49,6 +48,16 @@ fn describe(report: &simplify::Report) -> String {
 }
 
 pub(super) fn info(command: &Info) -> Result<()> {
+    if let Input::Stored(file) = Input::one(&[command.file.display().to_string()])? {
+        let facts = Store::open(&file)?.facts();
+        if command.json {
+            let value: serde_json::Map<_, _> =
+                facts.into_iter().map(|(name, value)| (name.replace(' ', "_"), value.into())).collect();
+            return print(&format!("{:#}\n", serde_json::Value::from(value)));
+        }
+        let lines = facts.iter().map(|(name, value)| format!("{name:20} {value}\n"));
+        return print(&lines.collect::<String>());
+    }
     let log = read_log(&command.file)?;
     let bytes = std::fs::metadata(&command.file).with_context(|| command.file.display().to_string())?.len();
     let forest = log.forest()?;
@@ -96,6 +105,11 @@ fn base_triangles(log: &CollapseLog) -> usize {
 
 /// Everything that reading checks, and that bounds are nested: what the criterion relies on.
 pub(super) fn verify(command: &Verify) -> Result<()> {
+    if let Input::Stored(file) = Input::one(&[command.file.display().to_string()])? {
+        let store = Store::open(&file)?;
+        stage(&format!("{}: verifying", file.display()), |_| store.verify())?;
+        return print(&format!("{}: every page of {} is in order\n", file.display(), store.backend().name()));
+    }
     let log = read_log(&command.file)?;
     let forest = log.forest()?;
     for (n, (collapse, &parent)) in log.collapses.iter().zip(&forest.parent).enumerate() {

@@ -2,21 +2,26 @@
 
 use std::io::Read;
 use std::path::{Path, PathBuf};
+use std::sync::Arc;
 
 use anyhow::{Context, Result, bail};
 use vertex_tree::{CollapseLog, Mesh};
 
 use super::progress::stage;
+use crate::compare::Subject;
 use crate::mesh_io;
 use crate::scene::Scene;
 use crate::simplify;
+use crate::store::{self, Backend, BuildOptions, Store};
 
 /// One thing to work on.
 #[derive(Clone, Debug, PartialEq)]
 pub(super) enum Input {
     Scene(Scene),
-    /// A hierarchy file.
+    /// A collapse log.
     Log(PathBuf),
+    /// The file of a backend that pages.
+    Stored(PathBuf),
     /// A mesh, or the tiles of a mosaic.
     Meshes(Vec<PathBuf>),
 }
@@ -32,9 +37,16 @@ impl Input {
                 continue;
             }
             let path = PathBuf::from(argument);
-            if is_log(&path)? {
-                inputs.push(Self::Log(path));
-                continue;
+            match backend_of(&path)? {
+                Some(Backend::InMemory) => {
+                    inputs.push(Self::Log(path));
+                    continue;
+                }
+                Some(_) => {
+                    inputs.push(Self::Stored(path));
+                    continue;
+                }
+                None => {}
             }
             if is_tile(&path) {
                 if let Some(Self::Meshes(paths)) = tiles.and_then(|at| inputs.get_mut(at)) {
@@ -63,7 +75,7 @@ impl Input {
             |path: &Path| path.file_stem().map_or_else(String::new, |s| s.to_string_lossy().into_owned());
         match self {
             Self::Scene(scene) => scene.to_string().trim_start_matches("scene:").to_owned(),
-            Self::Log(path) => stem(path),
+            Self::Log(path) | Self::Stored(path) => stem(path),
             Self::Meshes(paths) if paths.len() == 1 => stem(&paths[0]),
             Self::Meshes(paths) => format!("{}+{}", stem(&paths[0]), paths.len() - 1),
         }
@@ -75,14 +87,22 @@ impl Input {
         match self {
             Self::Scene(scene) => stage(&format!("{name}: making the scene"), |p| Ok(scene.mesh(p))),
             Self::Log(path) => Ok(vertex_tree::read_log(path)?.mesh),
+            Self::Stored(path) => {
+                let subject = Subject::of_store(&name, Store::open(path)?);
+                Ok(stage(&format!("{name}: reading"), |_| subject.finest())?)
+            }
             Self::Meshes(paths) => Ok(stage(&format!("{name}: reading"), |p| mesh_io::read(paths, p))?),
         }
     }
 
     /// The hierarchy: read, or built. `None` as the report says that it was read.
     pub fn log(&self, merge_components: bool) -> Result<(CollapseLog, Option<simplify::Report>)> {
-        if let Self::Log(path) = self {
-            return Ok((vertex_tree::read_log(path)?, None));
+        match self {
+            Self::Log(path) => return Ok((vertex_tree::read_log(path)?, None)),
+            Self::Stored(path) => {
+                bail!("{}: this is a hierarchy already; a mesh or a collapse log is expected", path.display())
+            }
+            _ => {}
         }
         let mesh = self.mesh()?;
         let options = simplify::Options {
@@ -97,8 +117,8 @@ impl Input {
     }
 }
 
-/// Whether a file starts like a hierarchy.
-fn is_log(path: &Path) -> Result<bool> {
+/// The backend whose hierarchy a file starts like, if it does.
+fn backend_of(path: &Path) -> Result<Option<Backend>> {
     let named = || path.display().to_string();
     let mut file = std::fs::File::open(path).with_context(named)?;
     if file.metadata().with_context(named)?.is_dir() {
@@ -106,9 +126,59 @@ fn is_log(path: &Path) -> Result<bool> {
     }
     let mut start = [0; 8];
     match file.read_exact(&mut start) {
-        Ok(()) => Ok(&start == b"FFCOLLOG"),
-        Err(e) if e.kind() == std::io::ErrorKind::UnexpectedEof => Ok(false),
+        Ok(()) => Ok(Backend::of_magic(start)),
+        Err(e) if e.kind() == std::io::ErrorKind::UnexpectedEof => Ok(None),
         Err(e) => Err(e).with_context(named),
+    }
+}
+
+/// Something to replay, and what is known of it.
+pub(super) struct Replayable {
+    pub subject: Subject,
+    /// Of the input, where it was simplified for this.
+    pub built: Option<simplify::Report>,
+    pub facts: Vec<(&'static str, String)>,
+    /// A path around it needs its mesh.
+    pub mesh: Mesh,
+    /// The folder of its file, where it has been written for this: to be kept as long as the subject.
+    pub folder: Option<tempfile::TempDir>,
+}
+
+impl Input {
+    /// Opens the input in each of these backends; in its own, if there are none.
+    pub fn replayable(&self, backends: &[Backend], options: &BuildOptions) -> Result<Vec<Replayable>> {
+        let name = self.name();
+        if let Self::Stored(path) = self {
+            let store = Store::open(path)?;
+            let own = store.backend();
+            if let Some(other) = backends.iter().find(|&&backend| backend != own) {
+                bail!("{}: is for {}, not for {}", path.display(), own.name(), other.name());
+            }
+            let facts = store.facts();
+            let subject = Subject::of_store(&name, store);
+            let mesh = stage(&format!("{name}: reading"), |_| subject.finest())?;
+            return Ok(vec![Replayable { subject, built: None, facts, mesh, folder: None }]);
+        }
+        let (log, built) = self.log(false)?;
+        let log = Arc::new(log);
+        let backends = if backends.is_empty() { &[Backend::InMemory] } else { backends };
+        let open = |&backend: &Backend| {
+            let (store, folder) = if backend == Backend::InMemory {
+                (Store::in_memory(log.clone())?, None)
+            } else {
+                let folder = tempfile::tempdir()?;
+                let file = folder.path().join(&name);
+                stage(&format!("{name}: writing for {}", backend.name()), |_| {
+                    store::write(backend, &file, &log, options)
+                })?;
+                (Store::open(&file)?, Some(folder))
+            };
+            let facts = store.facts();
+            let subject = Subject::of_store(&name, store);
+            let mesh = log.mesh.clone();
+            Ok(Replayable { subject, built: built.clone(), facts, mesh, folder })
+        };
+        backends.iter().map(open).collect()
     }
 }
 

@@ -20,7 +20,7 @@ use meta_node::{MetaNodeFile, MetaNodeTree};
 use mt_partition::{BuildOptions, MtTree};
 
 use super::graph_cut::{self, GraphCut};
-use super::settled::Settled;
+use foldfront::settled::Settled;
 
 use super::detail_block as detail;
 

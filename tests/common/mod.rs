@@ -5,7 +5,6 @@ pub mod backends;
 pub mod data;
 pub mod detail_block;
 pub mod graph_cut;
-pub mod settled;
 pub mod sink;
 
 use foldfront::view::View;

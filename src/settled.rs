@@ -1,12 +1,12 @@
-//! A backend that never misses: it waits for every page at once, so that cuts are comparable in every frame.
+//! A backend that waits for its pages: for replays whose cuts can be compared in every frame, not for viewers.
 
-use foldfront::Bounds;
-use foldfront::vertex_tree::{MeshSink, NodeId, PageStats, Step, TreeError, VertexTree};
+use vertex_tree::{Bounds, MeshSink, NodeId, PageStats, Step, TreeError, VertexTree};
 
-/// Waits inside of a change until what it needs has come. For backends that let frames begin and end at any time.
+/// Waits inside of a change until what it needs has come. A change that still is refused then, as memory is too small for
+/// it, is a miss.
 pub struct Settled<T>(pub T);
 
-/// A change that is refused more often is never made.
+/// A change that is refused more often is left to the next frame.
 const PATIENCE: usize = 100;
 
 impl<T: VertexTree> Settled<T> {
@@ -29,6 +29,7 @@ impl<T: VertexTree> Settled<T> {
 
 impl<T: VertexTree> VertexTree for Settled<T> {
     const IS_TREE: bool = T::IS_TREE;
+    const PREPARATION: usize = T::PREPARATION;
 
     fn node_limit(&self) -> u32 {
         self.0.node_limit()
@@ -41,6 +42,15 @@ impl<T: VertexTree> VertexTree for Settled<T> {
     }
     fn bounds(&self, node: NodeId) -> Bounds {
         self.0.bounds(node)
+    }
+    fn children_and_bounds(&self, node: NodeId) -> impl Iterator<Item = (NodeId, Bounds)> {
+        self.0.children_and_bounds(node)
+    }
+    fn prepare<M: MeshSink>(&self, node: NodeId, step: usize, mesh: &M) {
+        self.0.prepare(node, step, mesh);
+    }
+    fn will_need(&mut self, node: NodeId, ticks: u32) {
+        self.0.will_need(node, ticks);
     }
     fn children(&self, node: NodeId) -> impl Iterator<Item = NodeId> {
         self.0.children(node)

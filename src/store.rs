@@ -1,0 +1,213 @@
+//! Hierarchies in files, whatever the backend: built, opened, described and verified under one name.
+
+use std::path::{Path, PathBuf};
+use std::sync::Arc;
+
+use detail_block::{XfmError, XfmFile};
+use in_memory::Hierarchy;
+use meta_node::{MetaNodeError, MetaNodeFile};
+use mt_partition::{MtError, MtFile};
+use vertex_tree::source::{FileSource, PageSource};
+use vertex_tree::{CollapseLog, LogError, LogFileError, read_log, write_log};
+
+/// Where a hierarchy is kept.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+pub enum Backend {
+    /// The whole hierarchy resident, from a collapse log.
+    InMemory,
+    /// Meta-node trees (El-Sana & Chiang).
+    MetaNode,
+    /// XFastMesh (DeCoro & Pajarola).
+    DetailBlock,
+    /// A partitioned multi-triangulation (Holst & Schumann).
+    MtPartition,
+}
+
+impl Backend {
+    /// All of them, in the order of reports.
+    pub const ALL: [Self; 4] = [Self::InMemory, Self::MetaNode, Self::DetailBlock, Self::MtPartition];
+
+    /// The name on the command line and in files.
+    #[must_use]
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::InMemory => "in-memory",
+            Self::MetaNode => "meta-node",
+            Self::DetailBlock => "detail-block",
+            Self::MtPartition => "mt-partition",
+        }
+    }
+
+    /// The backend whose files start with these bytes.
+    #[must_use]
+    pub fn of_magic(magic: [u8; 8]) -> Option<Self> {
+        match magic {
+            meta_node::MAGIC => Some(Self::MetaNode),
+            detail_block::MAGIC => Some(Self::DetailBlock),
+            mt_partition::MAGIC => Some(Self::MtPartition),
+            _ if &magic == b"FFCOLLOG" => Some(Self::InMemory),
+            _ => None,
+        }
+    }
+}
+
+/// How to write a hierarchy, in the terms of each backend.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct BuildOptions {
+    /// Levels of the binary tree in a meta-node or a detail block.
+    pub levels: Option<u32>,
+    /// Whether nodes of detail blocks are quantised.
+    pub quantize: bool,
+    /// Triangles that the arcs of a multi-triangulation hold on average.
+    pub patch: Option<f64>,
+    /// Most nodes in a partition.
+    pub partition: Option<u32>,
+}
+
+/// A hierarchy could not be written, opened or verified.
+#[derive(Debug, thiserror::Error)]
+#[non_exhaustive]
+pub enum StoreError {
+    /// The operating system said no.
+    #[error("{}: {source}", file.display())]
+    Io {
+        /// The file.
+        file: PathBuf,
+        /// Why.
+        source: std::io::Error,
+    },
+    /// The file is none that `build` wrote.
+    #[error("{}: no hierarchy", file.display())]
+    Foreign {
+        /// The file.
+        file: PathBuf,
+    },
+    /// A collapse log is damaged.
+    #[error(transparent)]
+    LogFile(#[from] LogFileError),
+    /// A collapse log does not make sense.
+    #[error(transparent)]
+    Log(#[from] LogError),
+    /// A file of meta-nodes.
+    #[error(transparent)]
+    MetaNode(#[from] MetaNodeError),
+    /// A file of detail blocks.
+    #[error(transparent)]
+    DetailBlock(#[from] XfmError),
+    /// A file of partitions.
+    #[error(transparent)]
+    MtPartition(#[from] MtError),
+}
+
+/// A hierarchy that trees can be opened from.
+#[derive(Clone)]
+pub enum Store {
+    /// With the log that it came from.
+    InMemory(Arc<Hierarchy>, Arc<CollapseLog>),
+    /// See [`Backend::MetaNode`].
+    MetaNode(Arc<MetaNodeFile>),
+    /// See [`Backend::DetailBlock`].
+    DetailBlock(Arc<XfmFile>),
+    /// See [`Backend::MtPartition`].
+    MtPartition(Arc<MtFile>),
+}
+
+/// Writes a log as the file of a backend, whole or not at all.
+///
+/// # Errors
+/// What the backend says.
+pub fn write(
+    backend: Backend,
+    file: &Path,
+    log: &CollapseLog,
+    options: &BuildOptions,
+) -> Result<(), StoreError> {
+    match backend {
+        Backend::InMemory => write_log(file, log)?,
+        Backend::MetaNode => {
+            let options = meta_node::BuildOptions { levels: options.levels, ..Default::default() };
+            meta_node::write(file, log, &options)?;
+        }
+        Backend::DetailBlock => {
+            let mut build = detail_block::BuildOptions { quantize: options.quantize, ..Default::default() };
+            build.levels = options.levels.unwrap_or(build.levels);
+            detail_block::write(file, log, &build)?;
+        }
+        Backend::MtPartition => {
+            let mut build = mt_partition::BuildOptions::default();
+            build.patch = options.patch.unwrap_or(build.patch);
+            build.partition = options.partition.unwrap_or(build.partition);
+            mt_partition::write(file, log, &build)?;
+        }
+    }
+    Ok(())
+}
+
+impl Store {
+    /// Arranges a log for the in-memory tree.
+    ///
+    /// # Errors
+    /// [`StoreError::Log`].
+    pub fn in_memory(log: Arc<CollapseLog>) -> Result<Self, StoreError> {
+        Ok(Self::InMemory(Arc::new(Hierarchy::new(&log)?), log))
+    }
+
+    /// Opens a file that `build` wrote.
+    ///
+    /// # Errors
+    /// [`StoreError::Foreign`], and what is wrong with the file.
+    pub fn open(file: &Path) -> Result<Self, StoreError> {
+        let io = |source| StoreError::Io { file: file.to_owned(), source };
+        let source = FileSource::open(file).map_err(io)?;
+        let mut magic = [0; 8];
+        let backend = match source.read_at(0, &mut magic) {
+            Ok(()) => Backend::of_magic(magic),
+            Err(e) if e.kind() == std::io::ErrorKind::UnexpectedEof => None,
+            Err(e) => return Err(io(e)),
+        };
+        let source: Arc<dyn PageSource> = Arc::new(source);
+        match backend {
+            None => Err(StoreError::Foreign { file: file.to_owned() }),
+            Some(Backend::InMemory) => Self::in_memory(Arc::new(read_log(file)?)),
+            Some(Backend::MetaNode) => Ok(Self::MetaNode(Arc::new(MetaNodeFile::open(source)?))),
+            Some(Backend::DetailBlock) => Ok(Self::DetailBlock(Arc::new(XfmFile::open_path(file)?))),
+            Some(Backend::MtPartition) => Ok(Self::MtPartition(Arc::new(MtFile::open(source)?))),
+        }
+    }
+
+    /// The backend that it is for.
+    #[must_use]
+    pub fn backend(&self) -> Backend {
+        match self {
+            Self::InMemory(..) => Backend::InMemory,
+            Self::MetaNode(_) => Backend::MetaNode,
+            Self::DetailBlock(_) => Backend::DetailBlock,
+            Self::MtPartition(_) => Backend::MtPartition,
+        }
+    }
+
+    /// What is in a paging backend's file, as name and value; nothing for a log, which speaks for itself.
+    #[must_use]
+    pub fn facts(&self) -> Vec<(&'static str, String)> {
+        match self {
+            Self::InMemory(..) => Vec::new(),
+            Self::MetaNode(file) => file.facts(),
+            Self::DetailBlock(file) => file.facts(),
+            Self::MtPartition(file) => file.facts(),
+        }
+    }
+
+    /// Reads and checks every page.
+    ///
+    /// # Errors
+    /// What is wrong.
+    pub fn verify(&self) -> Result<(), StoreError> {
+        match self {
+            Self::InMemory(..) => {}
+            Self::MetaNode(file) => file.verify()?,
+            Self::DetailBlock(file) => file.verify()?,
+            Self::MtPartition(file) => file.verify()?,
+        }
+        Ok(())
+    }
+}
