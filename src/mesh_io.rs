@@ -29,12 +29,14 @@ mod off;
 mod ply;
 mod polygon;
 mod raster;
+mod receiver;
 mod stl;
 mod terrain;
 mod text;
 
 pub use error::{MeshIoError, Place};
 pub use ply::write_ply;
+pub use receiver::Receiver;
 
 use std::path::Path;
 
