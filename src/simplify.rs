@@ -16,6 +16,7 @@ mod surface;
 mod virtual_edges;
 
 use std::convert::Infallible;
+use std::ops::Range;
 use std::time::{Duration, Instant};
 
 use glam::{DVec3, Vec3};
@@ -39,6 +40,29 @@ pub struct Options {
     pub merge_components: bool,
 }
 
+/// A round of independent collapses, which is a pass where the mesh is larger than memory.
+#[derive(Clone, Debug, Default, PartialEq)]
+#[non_exhaustive]
+pub struct Round {
+    /// The largest key that was taken up.
+    pub limit: f32,
+    /// Collapses made, and the keys of the first and of the last of them.
+    pub collapses: usize,
+    /// See [`collapses`](Self::collapses).
+    pub keys: [f32; 2],
+}
+
+impl Round {
+    /// Puts a collapse behind the others.
+    fn push(&mut self, key: f32) {
+        if self.collapses == 0 {
+            self.keys[0] = key;
+        }
+        self.keys[1] = key;
+        self.collapses += 1;
+    }
+}
+
 /// What a simplification did.
 #[derive(Clone, Debug, Default, PartialEq)]
 #[non_exhaustive]
@@ -47,8 +71,8 @@ pub struct Report {
     pub triangles: usize,
     /// Collapses made.
     pub collapses: usize,
-    /// Rounds of independent collapses.
-    pub rounds: usize,
+    /// Rounds of independent collapses, in order.
+    pub rounds: Vec<Round>,
     /// Roots of the forest.
     pub roots: usize,
     /// Depth of the forest.
@@ -115,8 +139,8 @@ pub fn build(mesh: Mesh, options: &Options, progress: Progress) -> Result<(Colla
     let run = builder.run(
         all,
         |v| v,
-        |builder, nodes| {
-            rounds.push(nodes.start);
+        |builder, nodes, limit| {
+            rounds.push((nodes, limit));
             progress((all - builder.surface.live.len()) as u64, all as u64);
             Ok::<(), Infallible>(())
         },
@@ -126,7 +150,7 @@ pub fn build(mesh: Mesh, options: &Options, progress: Progress) -> Result<(Colla
 
     let start = Instant::now();
     let nodes = &builder.nodes;
-    let (sequence, inversions) = sequence(&nodes.keys, &rounds);
+    let (sequence, rounds, inversions) = sequence(&nodes.keys, &rounds);
     let collapses = sequence.iter().map(|&node| {
         let c = nodes.collapses[node as usize];
         Collapse { removed: order[c.removed as usize], kept: order[c.kept as usize], ..c }
@@ -136,7 +160,7 @@ pub fn build(mesh: Mesh, options: &Options, progress: Progress) -> Result<(Colla
     let report = Report {
         triangles: log.mesh.triangles.len(),
         collapses: log.collapses.len(),
-        rounds: rounds.len(),
+        rounds,
         roots: forest.roots().count(),
         tree_depth: forest.depth(),
         dependency_depth: nodes.depth.iter().copied().max().unwrap_or(0),
@@ -152,23 +176,25 @@ pub fn build(mesh: Mesh, options: &Options, progress: Progress) -> Result<(Colla
     Ok((log, report))
 }
 
-/// The nodes of each round in ascending order of keys, and the number of those whose key is less than an earlier one's.
-fn sequence(keys: &[f32], rounds: &[u32]) -> (Vec<u32>, usize) {
+/// The nodes of each round in ascending order of keys, what the rounds did, and the number of nodes whose key is less
+/// than an earlier one's. The rounds are given by their nodes and limits.
+fn sequence(keys: &[f32], rounds: &[(Range<u32>, f32)]) -> (Vec<u32>, Vec<Round>, usize) {
     let mut sequence: Vec<u32> = (0..keys.len() as u32).collect();
-    let ends = rounds.iter().skip(1).copied().chain([keys.len() as u32]);
-    for (&start, end) in rounds.iter().zip(ends) {
-        sequence[start as usize..end as usize]
-            .sort_unstable_by(|&a, &b| keys[a as usize].total_cmp(&keys[b as usize]).then(a.cmp(&b)));
-    }
     let (mut highest, mut inversions) = (0.0, 0);
-    for &node in &sequence {
-        let key = keys[node as usize];
-        if key < highest {
-            inversions += 1;
+    let mut done = Vec::with_capacity(rounds.len());
+    for (nodes, limit) in rounds {
+        let nodes = &mut sequence[nodes.start as usize..nodes.end as usize];
+        nodes.sort_unstable_by(|&a, &b| keys[a as usize].total_cmp(&keys[b as usize]).then(a.cmp(&b)));
+        let mut round = Round { limit: *limit, ..Round::default() };
+        for &node in &*nodes {
+            let key = keys[node as usize];
+            round.push(key);
+            inversions += usize::from(key < highest);
+            highest = key.max(highest);
         }
-        highest = key.max(highest);
+        done.push(round);
     }
-    (sequence, inversions)
+    (sequence, done, inversions)
 }
 
 /// Weight of a plane that holds a boundary edge in place, per squared length of the edge.

@@ -54,8 +54,8 @@ use window::Whole;
 /// What a construction may take.
 #[derive(Clone, Debug)]
 pub struct Limits<'a> {
-    /// Bytes of memory, for everything but the program itself and what it always needs. At least [`LEAST_MEMORY`] is
-    /// taken.
+    /// Bytes of memory, for everything that grows with the mesh. A single block of the construction, with its
+    /// surroundings, is taken into memory even if it is larger; less than [`LEAST_MEMORY`] is taken for that much.
     pub memory: u64,
     /// Where temporary files are made.
     pub temporary: PathBuf,
@@ -63,8 +63,8 @@ pub struct Limits<'a> {
     pub stop: &'a AtomicBool,
 }
 
-/// Less memory than this is not asked for.
-pub const LEAST_MEMORY: u64 = 4 << 20;
+/// Less memory than this can not be asked for.
+pub const LEAST_MEMORY: u64 = 1 << 16;
 
 /// A construction within given limits has failed. Nothing is left behind.
 #[derive(Debug, thiserror::Error)]
@@ -161,7 +161,7 @@ pub fn build_within(
         blocks,
         whole,
         stop: limits.stop,
-        window_bytes: memory - memory / 8,
+        window_bytes: memory - memory / 16,
         sort_bytes: (memory / 16) as usize,
         log: Log::new(&scratch).map_err(temporary)?,
         scratch,
@@ -198,7 +198,7 @@ pub fn build_within(
     Ok(Report {
         triangles: triangles as usize,
         collapses: collapses as usize,
-        rounds: log.rounds,
+        rounds: std::mem::take(&mut log.rounds),
         roots: passes.roots,
         tree_depth: log.tree_depth,
         dependency_depth: log.dependency_depth,

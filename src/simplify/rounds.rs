@@ -85,12 +85,12 @@ impl Builder {
     }
 
     /// Collapses until nothing legal is left. At the start there were `all` vertices, and `number` says which one of them
-    /// each is. `after_round` is called with the nodes of each round.
+    /// each is. `after_round` is called with the nodes of each round and the key up to which candidates were taken up.
     pub fn run<E>(
         &mut self,
         all: usize,
         number: impl Fn(u32) -> u32,
-        mut after_round: impl FnMut(&Builder, Range<u32>) -> Result<(), E>,
+        mut after_round: impl FnMut(&Builder, Range<u32>, f32) -> Result<(), E>,
     ) -> Result<(), E> {
         // How many vertices there were when virtual edges were last sought, and how far beyond their usual distance.
         let (mut sought_among, mut reach) = (usize::MAX, 1.0);
@@ -114,7 +114,7 @@ impl Builder {
                 self.candidates.parity = self.candidates.parity.other();
                 if self.nodes.next() > first {
                     self.surface.rebuild_stars();
-                    after_round(self, first..self.nodes.next())?;
+                    after_round(self, first..self.nodes.next(), limit)?;
                     hopeless_retried = false;
                 }
             } else if !hopeless_retried {

@@ -18,7 +18,7 @@ use std::io::{self, Read, Seek, SeekFrom, Write};
 use std::sync::Arc;
 
 /// Numbers of vertices in a block at the start.
-pub(super) const SPAN: u32 = 512;
+pub(super) const SPAN: u32 = 256;
 
 pub(super) const VERTEX_WORDS: usize = 22;
 pub(super) const TRIANGLE_WORDS: usize = 6;

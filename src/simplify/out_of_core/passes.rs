@@ -9,7 +9,7 @@ use vertex_tree::NONE;
 use super::super::candidates::Parity;
 use super::super::key_counts::KeyCounts;
 use super::super::rounds::{BLOCK, Builder, block_width};
-use super::super::{leaf_radius, set_initial_quadric};
+use super::super::{Round, leaf_radius, set_initial_quadric};
 use super::blocks::{Blocks, SPAN};
 use super::prepare::unscaled;
 use super::scratch::{Scratch, Spool};
@@ -57,7 +57,7 @@ pub(super) struct Passes<'a> {
 #[derive(Debug)]
 pub(super) struct Log {
     pub collapses: Spool<7>,
-    pub rounds: usize,
+    pub rounds: Vec<Round>,
     pub inversions: usize,
     pub largest_eps: f32,
     pub tree_depth: u32,
@@ -69,7 +69,7 @@ impl Log {
     pub fn new(scratch: &Scratch) -> io::Result<Log> {
         Ok(Log {
             collapses: scratch.spool()?,
-            rounds: 0,
+            rounds: Vec::new(),
             inversions: 0,
             largest_eps: 0.0,
             tree_depth: 0,
@@ -101,14 +101,17 @@ impl Log {
     }
 
     /// Puts the nodes of a round in order of their keys, which are not negative, so that their bits sort as they do.
-    fn end_round(&mut self, round: Sorter<9>) -> io::Result<()> {
-        self.rounds += 1;
-        round.finish(|[key, _, removed, kept, x, y, z, radius, eps]| {
+    fn end_round(&mut self, nodes: Sorter<9>, limit: f32) -> io::Result<()> {
+        let mut round = Round { limit, ..Round::default() };
+        nodes.finish(|[key, _, removed, kept, x, y, z, radius, eps]| {
             let key = f32::from_bits(key);
             self.inversions += usize::from(key < self.highest);
             self.highest = self.highest.max(key);
+            round.push(key);
             self.collapses.push([removed, kept, x, y, z, radius, eps])
-        })
+        })?;
+        self.rounds.push(round);
+        Ok(())
     }
 }
 
@@ -159,12 +162,12 @@ impl Passes<'_> {
         window.builder.run(
             self.all,
             |v| numbers[v as usize],
-            |builder, nodes| {
+            |builder, nodes, limit| {
                 check(stop)?;
                 progress(builder.surface.live.len());
                 let mut round = Sorter::new(scratch, sort_bytes);
                 log.collect(builder, nodes, |v| originals[v as usize], &mut round)?;
-                log.end_round(round)
+                log.end_round(round, limit)
             },
         )?;
         let (live, top) = (&window.builder.surface.live, &window.builder.nodes.top);
@@ -204,7 +207,10 @@ impl Passes<'_> {
                 self.live += kept;
             }
         }
-        if self.whole.next_id > self.whole.first_id { self.log.end_round(round) } else { Ok(()) }
+        match work {
+            Work::Round(limit) if self.whole.next_id > self.whole.first_id => self.log.end_round(round, limit),
+            _ => Ok(()),
+        }
     }
 
     fn work_on(&mut self, window: &mut Window, work: Work) {
