@@ -236,9 +236,7 @@ fn is_flat([a, b, c]: [u32; 3]) -> bool {
 
 /// The triangles with three different corners in the new numbering, in the order of their lowest vertices.
 fn coherent_triangles(triangles: &[[u32; 3]], number: &[u32]) -> Vec<[u32; 3]> {
-    let renumbered = || {
-        triangles.iter().map(|t| t.map(|v| number[v as usize])).filter(|t| !is_flat(*t))
-    };
+    let renumbered = || triangles.iter().map(|t| t.map(|v| number[v as usize])).filter(|t| !is_flat(*t));
     let lowest = |[a, b, c]: [u32; 3]| a.min(b).min(c) as usize;
     let mut place = vec![0_usize; number.len() + 1];
     for t in renumbered() {
@@ -258,12 +256,7 @@ fn coherent_triangles(triangles: &[[u32; 3]], number: &[u32]) -> Vec<[u32; 3]> {
 
 /// Gives `v` the planes of the triangles around it, weighted by area, and at edges that do not join exactly two triangles
 /// a plane through the edge, upright on the triangle. Also finds whether the vertex has such edges.
-fn set_initial_quadric(
-    v: u32,
-    surface: &mut Surface,
-    marks: &mut Marks,
-    neighbours: &mut Vec<(u32, u32)>,
-) {
+fn set_initial_quadric(v: u32, surface: &mut Surface, marks: &mut Marks, neighbours: &mut Vec<(u32, u32)>) {
     let mut quadric = Quadric::default();
     for spoke in surface.spokes(v) {
         let [a, b, c] = surface.triangles[spoke.triangle as usize].corners;

@@ -206,9 +206,16 @@ fn send_elements(
                         corners.clear();
                         corners.extend(vertex_indices.iter().filter_map(|&v| u32::try_from(v).ok()));
                         if failed.borrow().is_some() {
-                        } else if let Some(&index) = vertex_indices.iter().find(|&&v| u32::try_from(v).is_err()) {
+                        } else if let Some(&index) =
+                            vertex_indices.iter().find(|&&v| u32::try_from(v).is_err())
+                        {
                             let vertices = sender.vertices;
-                            fail(MeshIoError::IndexOutOfRange { file: path.to_owned(), place: here, index, vertices });
+                            fail(MeshIoError::IndexOutOfRange {
+                                file: path.to_owned(),
+                                place: here,
+                                index,
+                                vertices,
+                            });
                         } else if let Err(error) = sender.send(&corners, here, 0) {
                             fail(error);
                         }

@@ -165,6 +165,7 @@ pub fn build_within(
         sort_bytes: (memory / 16) as usize,
         log: Log::new(&scratch).map_err(temporary)?,
         scratch,
+        merge_components: options.merge_components,
         all: 0,
         live: 0,
         counts: KeyCounts::default(),
@@ -178,7 +179,6 @@ pub fn build_within(
 
     let start = Instant::now();
     let all = passes.all;
-    passes.whole.merge = options.merge_components;
     passes
         .run(|live| progress(200 + 700 * (all - live) as u64 / all.max(1) as u64, 1000))
         .map_err(temporary)?;

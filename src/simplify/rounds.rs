@@ -52,7 +52,7 @@ pub(super) struct Builder {
     /// Triangles that stand in where nothing takes the place of the star.
     others: Vec<u32>,
     /// Whether to join components.
-    merge: bool,
+    pub merge: bool,
     /// Length of a unit of the simplification in object units.
     scale: f64,
 }
@@ -98,20 +98,11 @@ impl Builder {
         loop {
             if self.merge && self.surface.live.len() <= sought_among / 2 {
                 sought_among = self.surface.live.len();
-                self.seek_virtual_edges(reach);
+                self.seek_virtual_edges(reach, 0..self.surface.live.len());
             }
             if let Some(limit) = self.key_limit() {
-                let (first, first_id) = (self.nodes.next(), self.nodes.next_id);
-                let width = block_width(all, self.surface.live.len());
-                let mut start = 0;
-                while start < self.surface.live.len() {
-                    let block = |i: usize| number(self.surface.live[i]) / width;
-                    let end = (start..self.surface.live.len()).find(|&i| block(i) != block(start));
-                    let end = end.unwrap_or(self.surface.live.len());
-                    self.run_block(limit, first_id, start..end);
-                    start = end;
-                }
-                self.candidates.parity = self.candidates.parity.other();
+                let first = self.nodes.next();
+                self.run_round(limit, all, &number, 0..self.surface.live.len());
                 if self.nodes.next() > first {
                     self.surface.rebuild_stars();
                     after_round(self, first..self.nodes.next(), limit)?;
@@ -122,11 +113,26 @@ impl Builder {
                 self.retry_hopeless(0..self.surface.live.len());
             } else if self.merge && reach < FARTHEST_REACH {
                 reach *= 2.0;
-                self.seek_virtual_edges(reach);
+                self.seek_virtual_edges(reach, 0..self.surface.live.len());
             } else {
                 return Ok(());
             }
         }
+    }
+
+    /// A round over the vertices `live[range]`; for the others see [`run`](Self::run). Stars have to be rebuilt afterwards
+    /// if there are new nodes.
+    pub fn run_round(&mut self, limit: f32, all: usize, number: impl Fn(u32) -> u32, range: Range<usize>) {
+        let first_id = self.nodes.next_id;
+        let width = block_width(all, self.surface.live.len());
+        let mut start = range.start;
+        while start < range.end {
+            let block = |i: usize| number(self.surface.live[i]) / width;
+            let end = (start..range.end).find(|&i| block(i) != block(start)).unwrap_or(range.end);
+            self.run_block(limit, first_id, start..end);
+            start = end;
+        }
+        self.candidates.parity = self.candidates.parity.other();
     }
 
     /// The part of a round in which the vertices `live[range]` come up, which are one block. `first` is the first node of
@@ -187,7 +193,9 @@ impl Builder {
             return;
         }
         let u = self.candidates.target[v as usize];
-        if self.surface.merged_into[u as usize] != NONE || self.nodes.is_from(self.nodes.top[u as usize], first) {
+        if self.surface.merged_into[u as usize] != NONE
+            || self.nodes.is_from(self.nodes.top[u as usize], first)
+        {
             return;
         }
         self.star.clear();
@@ -339,21 +347,23 @@ impl Builder {
         samples.error()
     }
 
-    /// Finds pairs for virtual edges, as far apart as vertices are on average on a plane, times `reach`.
-    fn seek_virtual_edges(&mut self, reach: f32) {
+    /// Finds pairs for virtual edges among the vertices `live[range]`, as far apart as vertices are on average on a plane,
+    /// times `reach`.
+    pub fn seek_virtual_edges(&mut self, reach: f32, range: Range<usize>) {
         let surface = &mut self.surface;
-        let positions = || surface.live.iter().map(|&v| surface.position(v));
+        let vertices = surface.live[range].to_vec();
+        let positions = || vertices.iter().map(|&v| surface.position(v));
         let low = positions().fold(glam::Vec3::INFINITY, glam::Vec3::min);
         let high = positions().fold(glam::Vec3::NEG_INFINITY, glam::Vec3::max);
         let mut sides = (high - low).to_array();
         sides.sort_by(|a, b| b.total_cmp(a));
-        let count = surface.live.len() as f32;
+        let count = vertices.len() as f32;
         let spacing = (sides[0] / count).max((sides[0] * sides[1] / count).sqrt());
         let cell = if spacing > 0.0 { 2.0 * spacing * reach } else { 1.0 };
         let mut edges = std::mem::take(&mut surface.virtual_edges);
-        edges.search(surface, cell);
+        edges.search(surface, &vertices, cell);
         surface.virtual_edges = edges;
-        for &v in &surface.live {
+        for v in vertices {
             if surface.virtual_edges.partners(v).next().is_some() {
                 self.candidates.state[v as usize] = State::Outdated(self.candidates.parity.other());
             }
@@ -362,7 +372,7 @@ impl Builder {
 }
 
 /// Times the average distance of vertices: beyond this, no pair is left to be found.
-const FARTHEST_REACH: f32 = 1e6;
+pub(super) const FARTHEST_REACH: f32 = 1e6;
 
 /// Numbers of vertices in a block, of which between a half and all are there: blocks widen as vertices grow fewer.
 pub(super) fn block_width(all: usize, live: usize) -> u32 {

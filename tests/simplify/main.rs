@@ -2,6 +2,7 @@
 
 #[path = "../common/mod.rs"]
 mod common;
+mod out_of_core;
 mod replay;
 
 use common::{Random, data};

@@ -12,7 +12,6 @@ use glam::Vec3;
 use rustc_hash::FxHasher;
 use vertex_tree::{Bounds, Collapse, NONE};
 
-use super::blocks::{Blocks, Counts, NODE_WORDS, POINT_WORDS, TRIANGLE_WORDS, VERTEX_WORDS, Words};
 use super::super::candidates::{Parity, State};
 use super::super::key_counts::KeyCounts;
 use super::super::marks::Marks;
@@ -20,6 +19,7 @@ use super::super::nodes::Nodes;
 use super::super::quadric::Quadric;
 use super::super::rounds::Builder;
 use super::super::surface::{Surface, Triangle};
+use super::blocks::{Blocks, Counts, NODE_WORDS, POINT_WORDS, TRIANGLE_WORDS, VERTEX_WORDS, Words};
 
 type FastMap = HashMap<u32, u32, BuildHasherDefault<FxHasher>>;
 
@@ -171,6 +171,13 @@ impl Window {
     pub fn inner(&self) -> impl Iterator<Item = (u32, std::ops::Range<usize>)> + '_ {
         let ranges = self.starts.windows(2).map(|ends| ends[0] as usize..ends[1] as usize);
         self.blocks.iter().zip(ranges).filter(|((_, ring), _)| *ring == Ring::Inner).map(|(b, r)| (b.0, r))
+    }
+
+    /// The slots of all vertices that come up.
+    pub fn inner_slots(&self) -> Option<std::ops::Range<u32>> {
+        let start = self.inner().next()?.1.start;
+        let end = self.inner().last()?.1.end;
+        Some(start as u32..end as u32)
     }
 
     /// Numbers in the whole mesh of all vertices.
