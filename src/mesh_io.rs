@@ -142,6 +142,24 @@ pub fn send(
     if counting.triangles == 0 { Err(MeshIoError::Empty { file: files[0].to_owned() }) } else { Ok(()) }
 }
 
+/// About how many triangles there are in files, by their lengths alone; 0 where that says nothing.
+#[must_use]
+pub fn expected_triangles(files: &[impl AsRef<Path>]) -> u64 {
+    let expected = |file: &Path| {
+        let bytes = std::fs::metadata(file).map_or(0, |m| m.len());
+        match &*extension(file) {
+            // Two bytes a sample, two triangles a cell; archived tiles are a half as large or less.
+            "hgt" => bytes,
+            "zip" => 2 * bytes,
+            // As text, and half as many as there are in a binary file.
+            "ply" | "obj" | "off" => bytes / 40,
+            "stl" => bytes / 50,
+            _ => 0,
+        }
+    };
+    files.iter().map(|file| expected(file.as_ref())).sum()
+}
+
 /// Counts the triangles on their way to another receiver.
 struct Counting<'a> {
     receiver: &'a mut dyn Receiver,

@@ -52,7 +52,8 @@ fn build_within(name: &str, files: &[PathBuf], memory: u64, command: &Build) -> 
         _ => PathBuf::from("."),
     };
     let options = simplify::Options { merge_components: command.merge_components };
-    let limits = simplify::Limits { memory, temporary: folder.clone(), stop: &STOP };
+    let expected_triangles = mesh_io::expected_triangles(files);
+    let limits = simplify::Limits { memory, temporary: folder.clone(), expected_triangles, stop: &STOP };
     let report = stage(&format!("{name}: building the hierarchy"), |p| {
         let read = |receiver: &mut dyn Receiver, progress: Progress<'_>| {
             mesh_io::send(files, &ReadOptions::default(), &folder, receiver, progress)

@@ -28,10 +28,6 @@ pub(super) enum Parity {
 }
 
 impl Parity {
-    pub fn of(round: usize) -> Parity {
-        if round.is_multiple_of(2) { Parity::Even } else { Parity::Odd }
-    }
-
     pub fn other(self) -> Parity {
         if self == Parity::Even { Parity::Odd } else { Parity::Even }
     }

@@ -17,7 +17,7 @@ use std::ops::Range;
 
 use vertex_tree::NONE;
 
-use super::candidates::{Candidates, Parity, State};
+use super::candidates::{Candidates, State};
 use super::key_counts::KeyCounts;
 use super::legality::is_legal;
 use super::marks::Marks;

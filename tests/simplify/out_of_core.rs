@@ -5,7 +5,7 @@ use std::sync::atomic::{AtomicBool, Ordering};
 
 use foldfront::mesh_io::{MeshIoError, Receiver};
 use foldfront::simplify::{LEAST_MEMORY, Limits, OutOfCoreError, Report, build_within};
-use foldfront::vertex_tree::read_log;
+use foldfront::vertex_tree::{LogError, read_log};
 use foldfront::{CollapseLog, Mesh};
 
 use crate::common::data;
@@ -19,10 +19,14 @@ fn send(mesh: &Mesh, receiver: &mut dyn Receiver) -> Result<(), MeshIoError> {
     mesh.triangles.iter().try_for_each(|&t| receiver.triangle(t)).map_err(MeshIoError::Receiver)
 }
 
+fn limits<'a>(memory: u64, folder: &Path, stop: &'a AtomicBool) -> Limits<'a> {
+    Limits { memory, temporary: folder.to_owned(), expected_triangles: 0, stop }
+}
+
 fn build(mesh: &Mesh, merge: bool, memory: u64) -> (CollapseLog, Report) {
     let folder = tempfile::tempdir().unwrap();
     let (file, stop) = (folder.path().join("log"), AtomicBool::new(false));
-    let limits = Limits { memory, temporary: folder.path().to_owned(), stop: &stop };
+    let limits = limits(memory, folder.path(), &stop);
     let mut last = 0;
     let progress = &mut |done, all| {
         assert!(last <= done && done <= all);
@@ -115,7 +119,7 @@ fn nothing_is_left_of_an_interrupted_construction() {
         let folder = tempfile::tempdir().unwrap();
         let (file, stop) = (folder.path().join("log"), AtomicBool::new(false));
         std::fs::write(&file, "written earlier").unwrap();
-        let limits = Limits { memory: LEAST_MEMORY, temporary: folder.path().to_owned(), stop: &stop };
+        let limits = limits(LEAST_MEMORY, folder.path(), &stop);
         let mut steps = 0;
         let progress = &mut |_, _| {
             steps += 1;
@@ -141,7 +145,7 @@ fn failures_are_named() {
     let (folder, stop) = (tempfile::tempdir().unwrap(), AtomicBool::new(false));
     let mesh = flat_grid(10, 1.0);
     let run = |temporary: &Path, file: &str, wrong: bool| {
-        let limits = Limits { memory: 1 << 20, temporary: temporary.to_owned(), stop: &stop };
+        let limits = limits(1 << 20, temporary, &stop);
         let read = |receiver: &mut dyn Receiver, _: &mut dyn FnMut(u64, u64)| {
             send(&mesh, receiver)?;
             if wrong { Err(MeshIoError::NoInput) } else { Ok(()) }
@@ -153,9 +157,33 @@ fn failures_are_named() {
     let error = run(&missing, "log", false);
     assert!(matches!(error, OutOfCoreError::Temporary { .. }), "{error:?}");
     assert!(error.to_string().contains("missing"), "{error}");
+    let full = Limits { expected_triangles: 1 << 50, ..limits(1 << 20, folder.path(), &stop) };
+    let read = |_: &mut dyn Receiver, _: &mut dyn FnMut(u64, u64)| panic!("read, though there is no room");
+    let error = build_within(read, &missing, &options(false), &full, &mut |_, _| ()).unwrap_err();
+    assert!(matches!(error, OutOfCoreError::Room { triangles: 0x4_0000_0000_0000, .. }), "{error:?}");
     let error = run(folder.path(), "nowhere/log", false);
     assert!(matches!(error, OutOfCoreError::Log(_)), "{error:?}");
     let error = run(folder.path(), "log", true);
     assert!(matches!(error, OutOfCoreError::Input(MeshIoError::NoInput)), "{error:?}");
+    let limits = limits(1 << 20, folder.path(), &stop);
+    for (position, triangle) in [([0.0; 3], [0, 1, 101]), ([0.0, f32::NAN, 0.0], [0, 1, 2])] {
+        let read = |receiver: &mut dyn Receiver, _: &mut dyn FnMut(u64, u64)| {
+            send(&mesh, receiver)?;
+            receiver
+                .position(position)
+                .and_then(|()| receiver.triangle(triangle))
+                .map_err(MeshIoError::Receiver)
+        };
+        let outcome = build_within(read, &missing, &options(false), &limits, &mut |_, _| ());
+        match outcome {
+            Err(OutOfCoreError::Mesh(LogError::BadPosition { vertex: 100, .. })) => {
+                assert!(position[1].is_nan())
+            }
+            Err(OutOfCoreError::Mesh(LogError::CornerOutOfRange { vertex, vertices, .. })) => {
+                assert_eq!((vertex, vertices), (101, 101));
+            }
+            other => panic!("{other:?}"),
+        }
+    }
     assert_eq!(names(folder.path()), <[&str; 0]>::default());
 }

@@ -42,11 +42,11 @@ impl Counts {
             + self.points as usize * POINT_WORDS
     }
 
-    /// Bytes of memory that a window takes for it.
+    /// Bytes of memory that a window takes for it, with what the work on it needs.
     fn memory(self) -> u64 {
-        144 * u64::from(self.vertices)
-            + 44 * u64::from(self.triangles)
-            + 84 * u64::from(self.nodes)
+        168 * u64::from(self.vertices)
+            + 48 * u64::from(self.triangles)
+            + 92 * u64::from(self.nodes)
             + 22 * u64::from(self.points)
     }
 }
@@ -186,10 +186,8 @@ impl Blocks {
         let segment = Segment { file: self.file.clone(), offset: self.length, counts };
         self.length += 4 * counts.words() as u64;
         let segments = &mut self.list[block as usize].segments;
-        segments.clear();
-        if counts != Counts::default() {
-            segments.push(segment);
-        }
+        // A vector that grows would have room for four.
+        *segments = if counts == Counts::default() { Vec::new() } else { vec![segment] };
         Ok(())
     }
 

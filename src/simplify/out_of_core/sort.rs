@@ -9,7 +9,7 @@ use std::collections::binary_heap::PeekMut;
 use std::fs::File;
 use std::io::{self, Write};
 
-use super::scratch::{Reader, Scratch, Spool};
+use super::scratch::{Reader, Scratch};
 
 /// Runs that are merged at a time.
 const MOST_RUNS: usize = 1024;
@@ -89,13 +89,6 @@ impl<const N: usize> Sorter<N> {
             (file, self.ends) = (merged, ends);
         }
         merge(&file, 0, &self.ends, self.most / self.ends.len(), take)
-    }
-
-    /// All records in order, on disk.
-    pub fn into_spool(self) -> io::Result<Spool<N>> {
-        let mut spool = self.scratch.spool()?;
-        self.finish(|record| spool.push(record))?;
-        Ok(spool)
     }
 }
 

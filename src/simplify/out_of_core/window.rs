@@ -274,16 +274,18 @@ impl Window {
         let (surface, candidates, nodes) =
             (&self.builder.surface, &self.builder.candidates, &self.builder.nodes);
         let i = v as usize;
-        words.vertices.extend([self.number(v), self.originals[i]]);
-        words.vertices.extend(surface.positions[i].to_array().map(f32::to_bits));
-        words.vertices.extend(surface.quadrics[i].to_array().map(f32::to_bits));
         let state = candidates.state[i];
         let has_target = !matches!(state, State::Outdated(_) | State::Nothing);
         let target = if has_target { self.number(candidates.target[i]) } else { NONE };
         let flags = code(state) | u32::from(surface.special[i]) << 4 | u32::from(surface.joined[i]) << 5;
         let [top, trace] = [nodes.top[i], nodes.trace[i]].map(|node| put_node(node, nodes, words, marks));
-        words.vertices.extend([candidates.key[i].to_bits(), target, flags, top, trace]);
-        words.vertices.push(nodes.leaf_radius[i].to_bits());
+        let mut record = [0; VERTEX_WORDS];
+        record[..2].copy_from_slice(&[self.number(v), self.originals[i]]);
+        record[2..5].copy_from_slice(&surface.positions[i].to_array().map(f32::to_bits));
+        record[5..16].copy_from_slice(&surface.quadrics[i].to_array().map(f32::to_bits));
+        record[16..21].copy_from_slice(&[candidates.key[i].to_bits(), target, flags, top, trace]);
+        record[21] = nodes.leaf_radius[i].to_bits();
+        words.vertices.extend_from_slice(&record);
     }
 
     fn put_triangle(&self, t: u32, words: &mut Words, marks: &mut Marks) {
@@ -293,16 +295,15 @@ impl Window {
         let mut point = triangle.samples;
         while point != NONE {
             let p = point as usize;
-            words.points.extend([self.number(point), u32::from(surface.special[p])]);
-            words.points.extend(surface.positions[p].to_array().map(f32::to_bits));
+            let [x, y, z] = surface.positions[p].to_array().map(f32::to_bits);
+            words.points.extend_from_slice(&[self.number(point), u32::from(surface.special[p]), x, y, z]);
             point = samples.next[p];
             count += 1;
         }
         let creator = put_node(triangle.creator, &self.builder.nodes, words, marks);
         let id = surface.triangle_ids.as_ref().map_or(t, |ids| ids[t as usize]);
-        words.triangles.push(id);
-        words.triangles.extend(triangle.corners.map(|v| self.number(v)));
-        words.triangles.extend([creator, count]);
+        let [a, b, c] = triangle.corners.map(|v| self.number(v));
+        words.triangles.extend_from_slice(&[id, a, b, c, creator, count]);
     }
 
     /// Finds anew with which blocks those near the inner ones share triangles, as far as something has changed there.
@@ -343,9 +344,10 @@ fn put_node(node: u32, nodes: &Nodes, words: &mut Words, marks: &mut Marks) -> u
     let place = (words.nodes.len() / NODE_WORDS) as u32;
     marks.set(node, place);
     let (i, bounds) = (node as usize, nodes.collapses[node as usize].bounds);
-    words.nodes.push(nodes.id(node));
-    words.nodes.extend(bounds.center.map(f32::to_bits));
-    words.nodes.extend([bounds.radius.to_bits(), bounds.eps.to_bits(), nodes.depth[i], nodes.height[i]]);
+    let [x, y, z] = bounds.center.map(f32::to_bits);
+    let [radius, eps] = [bounds.radius, bounds.eps].map(f32::to_bits);
+    let [depth, height] = [nodes.depth[i], nodes.height[i]];
+    words.nodes.extend_from_slice(&[nodes.id(node), x, y, z, radius, eps, depth, height]);
     place
 }
 
