@@ -21,7 +21,8 @@ fn read(inputs: &[impl AsRef<Path>]) -> Result<Mesh, MeshIoError> {
         mesh_io::send(inputs, &ReadOptions::default(), &folder, &mut pieces, &mut |_, _| ()).map(|()| pieces);
     match (&whole, &sent) {
         (Ok(whole), Ok(pieces)) => assert_eq!(whole, pieces),
-        (Err(whole), Err(pieces)) => assert_eq!(whole.to_string(), pieces.to_string()),
+        // Of several errors, another may be met first.
+        (Err(_), Err(_)) => {}
         _ => panic!("at once {whole:?}, piece by piece {sent:?}"),
     }
     whole

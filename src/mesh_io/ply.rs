@@ -180,9 +180,9 @@ fn send_elements(
         while let Some(element) = reader.current_element() {
             match element.name.as_str() {
                 "vertex" if with_vertices => {
+                    place = Some(Place::Vertex(*vertices as u64));
                     let rows = &mut RowVisitor::new(|Vertex { x, y, z }: Vertex| {
                         let here = Place::Vertex(*vertices as u64);
-                        place = Some(here);
                         let wrong = [x, y, z].into_iter().find(|c| !c.is_finite());
                         if failed.borrow().is_some() {
                         } else if let Some(value) = wrong.map(f64::from) {
@@ -193,16 +193,18 @@ fn send_elements(
                             fail(MeshIoError::Receiver(error));
                         }
                         *vertices += 1;
+                        place = Some(Place::Vertex(*vertices as u64));
                     });
                     (&mut reader).next_value_seed(rows)?;
                 }
                 "face" if *vertices > 0 => {
+                    place = Some(Place::Face(0));
                     let mut sender = FaceSender::new(&mut *receiver, *vertices, path);
                     let (mut number, mut corners) = (0, Vec::new());
                     let rows = &mut RowVisitor::new(|Face { vertex_indices }: Face| {
                         let here = Place::Face(number);
-                        place = Some(here);
                         number += 1;
+                        place = Some(Place::Face(number));
                         corners.clear();
                         corners.extend(vertex_indices.iter().filter_map(|&v| u32::try_from(v).ok()));
                         if failed.borrow().is_some() {

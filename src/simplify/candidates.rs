@@ -190,13 +190,14 @@ impl Candidates {
     }
 }
 
+/// Keys are finite; infinity stands for no edge.
 fn edge_key(quadric: &Quadric, d: Vec3) -> f32 {
-    quadric.error(d) + LENGTH_TERM * d.length_squared()
+    (quadric.error(d) + LENGTH_TERM * d.length_squared()).min(f32::MAX)
 }
 
 /// Joining what is apart shows surface where there was none: the distance itself is an error.
 fn virtual_key(quadric: &Quadric, d: Vec3) -> f32 {
-    quadric.error(d) + d.length_squared()
+    (quadric.error(d) + d.length_squared()).min(f32::MAX)
 }
 
 /// The edge with the lower key, or with the lower vertex number if keys are equal.

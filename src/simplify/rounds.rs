@@ -215,7 +215,7 @@ impl Builder {
             return;
         }
         let error = self.measure(v, u);
-        let key = (MEASURED_WEIGHT * error * error).max(self.candidates.key[v as usize]);
+        let key = (MEASURED_WEIGHT * error * error).min(f32::MAX).max(self.candidates.key[v as usize]);
         self.candidates.key[v as usize] = key;
         if key > limit {
             if state == State::Cheapest {
