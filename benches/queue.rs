@@ -1,8 +1,9 @@
 //! Queue operations, at the sizes of a large front.
 
 use criterion::{BatchSize, Criterion, Throughput, criterion_group, criterion_main};
-use foldfront::queue::{EventQueue, Kind};
-use foldfront::{Bounds, NodeId};
+use foldfront::Bounds;
+use foldfront::front::Slot;
+use foldfront::queue::{DUE, Event, EventQueue, Kind};
 
 const EVENTS: u32 = 100_000;
 const BOUNDS: Bounds = Bounds { center: [0.0; 3], radius: 1.0, eps: 0.0 };
@@ -14,10 +15,10 @@ fn frames_ahead(node: u32) -> f64 {
 }
 
 fn filled() -> EventQueue {
-    let mut queue = EventQueue::new(EVENTS, 1);
+    let mut queue = EventQueue::new(1);
     for node in 0..EVENTS {
-        let event = queue.event(NodeId(node), Kind::Unfold, BOUNDS);
-        queue.schedule(0, 0.0, frames_ahead(node), event);
+        let event = queue.event(Slot(node), Kind::Unfold, BOUNDS);
+        queue.schedule(0, frames_ahead(node), event);
     }
     queue
 }
@@ -29,21 +30,26 @@ fn operations(criterion: &mut Criterion) {
     group.bench_function("cancel", |b| {
         b.iter_batched_ref(
             filled,
-            |queue| (0..EVENTS).for_each(|node| queue.cancel(NodeId(node))),
+            |queue| (0..EVENTS).for_each(|node| queue.cancel(Slot(node))),
             BatchSize::LargeInput,
         );
     });
     group.bench_function("advance and reschedule, 50 frames", |b| {
-        let mut due = Vec::new();
+        let mut due = [Event::BLANK; DUE];
         b.iter_batched_ref(
             filled,
             |queue| {
                 for frame in 1..=50 {
                     let now = f64::from(frame);
-                    due.clear();
-                    queue.advance(0, now, &mut due);
-                    for event in &due {
-                        queue.schedule(0, now, frames_ahead(event.node.0), *event);
+                    queue.advance(0, now);
+                    loop {
+                        let count = queue.next_due(&mut due);
+                        if count == 0 {
+                            break;
+                        }
+                        for event in &due[..count] {
+                            queue.schedule(0, frames_ahead(event.slot.0), *event);
+                        }
                     }
                 }
             },

@@ -62,17 +62,26 @@ fn main() {
     let tiles = ["N36W118", "N36W119", "N37W118", "N37W119"].map(|t| data.join(format!("terrain/{t}.hgt")));
     if is_chosen("sierra") && tiles[0].exists() {
         let log = cached("sierra", &simplify::Options::default(), || read(&tiles));
-        let walk = flight(&log.mesh);
+        let walk = flight(&log.mesh, "sierra flight", DVec3::X);
+        // Out of the mosaic, with the neighbours behind.
+        let outward = flight(&log.mesh, "outward flight", DVec3::new(-1.0, -1.0, 0.0).normalize());
         let hierarchy = arrange(&log);
         let quarter = cached("quarter", &simplify::Options::default(), || quarter(&log.mesh));
         drop(log);
-        let whole = calm_tables(&hierarchy, &walk, 1.0);
+        calm_tables(&hierarchy, &walk, 1.0);
         calm_tables(&hierarchy, &walk, 0.25);
+        println!("{} at 1 pixel in the mosaic", outward.name);
+        let whole = table(&hierarchy, &outward, &outward, 1.0);
         drop(hierarchy);
-        println!("the same path over the quarter that it lies in, alone");
-        let alone = calm_tables(&arrange(&quarter), &walk, 1.0);
-        for ((strategy, whole), alone) in EXACT.iter().zip(whole).zip(alone) {
-            println!("{:10} select in the mosaic : alone {:6.2}", strategy.name(), whole / alone);
+        println!("{} at 1 pixel over the quarter that it lies in, alone", outward.name);
+        let alone = table(&arrange(&quarter), &outward, &outward, 1.0);
+        for ((strategy, [whole, _]), [alone, _]) in EXACT.iter().zip(whole).zip(alone) {
+            println!(
+                "{:10} in the mosaic : alone  select {:6.2}  active nodes {:6.3}",
+                strategy.name(),
+                whole.select / alone.select,
+                whole.active / alone.active
+            );
         }
     }
 }
@@ -118,7 +127,7 @@ fn quarter(mesh: &Mesh) -> Mesh {
 }
 
 /// A flight in wide curves over the south-western quarter of a terrain, 50 m a frame, above the highest ground around.
-fn flight(mesh: &Mesh) -> Path {
+fn flight(mesh: &Mesh, name: &str, heading: DVec3) -> Path {
     const FRAMES: usize = 400;
     let ((lo, _), around) = (mesh.bounding_box().expect("a terrain"), 4000.0_f32);
     let ground = |x: f32, y: f32| {
@@ -129,7 +138,7 @@ fn flight(mesh: &Mesh) -> Path {
     let middle = DVec3::new(f64::from(lo[0]) * 0.5, f64::from(lo[1]) * 0.5, 0.0);
     let place = |frame: f64| {
         let along = frame * 50.0;
-        middle + DVec3::new(along - 10_000.0, 3000.0 * (along / 6000.0).sin(), 0.0)
+        middle + heading * (along - 10_000.0) + DVec3::Z.cross(heading) * 3000.0 * (along / 6000.0).sin()
     };
     let knots: Vec<f64> = (0..=(FRAMES + 200) / 50)
         .map(|i| {
@@ -153,7 +162,7 @@ fn flight(mesh: &Mesh) -> Path {
         })
         .collect();
     let (units, fov_y, aspect) = ("m".to_owned(), 60_f64.to_radians(), 16.0 / 9.0);
-    Path { name: "sierra flight".to_owned(), units, fov_y, aspect, frames }
+    Path { name: name.to_owned(), units, fov_y, aspect, frames }
 }
 
 /// The middle tenth of a path, at a tenth of its speed.
@@ -297,15 +306,14 @@ fn table(hierarchy: &Arc<Hierarchy>, walk: &Path, declared: &Path, pixels: f64) 
     best
 }
 
-/// A calm path at full speed, at a tenth of it and at rest. Returns the median selection times at full speed.
-fn calm_tables(hierarchy: &Arc<Hierarchy>, walk: &Path, pixels: f64) -> Vec<f64> {
+/// A calm path at full speed, at a tenth of it and at rest.
+fn calm_tables(hierarchy: &Arc<Hierarchy>, walk: &Path, pixels: f64) {
     println!("{} at {pixels} pixels, full speed", walk.name);
-    let full = table(hierarchy, walk, walk, pixels);
+    table(hierarchy, walk, walk, pixels);
     println!("{} at {pixels} pixels, a tenth of full speed", walk.name);
     table(hierarchy, &slow(walk), walk, pixels);
     println!("{} at {pixels} pixels, at rest", walk.name);
     table(hierarchy, &rest(walk), walk, pixels);
-    full.iter().map(|[kept, _]| kept.select).collect()
 }
 
 /// A path with stops, slow pans, spins and a teleport.

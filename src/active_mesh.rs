@@ -5,7 +5,7 @@
 //! shows the mesh. Per frame a renderer uploads the entries named by [`ActiveMesh::changed_triangles`] and
 //! [`ActiveMesh::changed_vertices`], then calls [`ActiveMesh::clear_changes`].
 
-use vertex_tree::{Mesh, MeshSink, NONE, TriangleId, VertexId};
+use vertex_tree::{Mesh, MeshSink, NONE, TriangleId, VertexId, prefetch};
 
 /// A slot of one of the buffers is named at most once among the changes.
 #[derive(Clone, Debug, Default)]
@@ -134,6 +134,11 @@ impl ActiveMesh {
 }
 
 impl MeshSink for ActiveMesh {
+    #[inline(always)]
+    fn prefetch(&self, triangle: TriangleId) {
+        prefetch(&self.triangles, triangle as usize);
+    }
+
     #[inline]
     fn vertex_added(&mut self, vertex: VertexId, position: [f32; 3]) {
         let at = vertex as usize;

@@ -23,6 +23,23 @@ pub enum Budget {
     FrameTime(Duration),
 }
 
+/// The most that one frame may do, whatever its views ask for: for worst frames, after a teleport or while much arrives
+/// from a store. What is left over is carried to the next frames, the most urgent changes first, and the cut is exact
+/// again when nothing is left. A [`Budget`] is about the tolerance that the cut is for; this is about the way there.
+#[derive(Clone, Copy, Debug, PartialEq, Default)]
+pub enum WorkCap {
+    /// Every frame does all that it finds to do.
+    #[default]
+    None,
+    /// At most so many folds and unfolds a frame, and the unfolds that the last of them forces.
+    Changes(u64),
+    /// Folds and unfolds for at most so long a frame.
+    Time(Duration),
+}
+
+/// Share of a cap that is spent on folds if there are any: what is folded late is not seen, but it adds up.
+pub(crate) const FOLDING_SHARE: f64 = 0.25;
+
 /// Most that the tolerance changes in a frame.
 pub const STEP: f64 = 0.03;
 

@@ -14,7 +14,7 @@ use in_memory::{Hierarchy, InMemoryTree};
 use vertex_tree::{CollapseLog, LogError, NullSink, TreeError};
 
 use crate::active_mesh::ActiveMesh;
-use crate::budget::Budget;
+use crate::budget::{Budget, WorkCap};
 use crate::criterion::Criterion;
 use crate::engine::{Engine, FrameReport, Settings};
 use crate::motion::Speed;
@@ -35,6 +35,8 @@ pub struct Options {
     pub theta: f64,
     /// What a frame may cost.
     pub budget: Budget,
+    /// What a frame may do.
+    pub work_cap: WorkCap,
     /// Full speed of the eye, in object units a frame; by default the path's 99th percentile.
     pub rho: Option<f64>,
     /// Full speed of turning, in radians a frame; by default the path's 99th percentile.
@@ -51,6 +53,7 @@ impl Default for Options {
             criterion: Criterion::default(),
             theta: theta_of_pixels(1.0, 1080),
             budget: Budget::None,
+            work_cap: WorkCap::None,
             rho: None,
             omega: None,
             check: false,
@@ -233,6 +236,7 @@ impl Subject {
                 rho: speed.rho,
                 omega: speed.omega,
                 budget: options.budget,
+                work_cap: options.work_cap,
             };
             let mut engine = self.engine(settings, |_| ActiveMesh::new())?;
             let mut rows = Vec::with_capacity(views.len());
@@ -247,10 +251,13 @@ impl Subject {
             if is_checked(strategy) {
                 let mut engine = self.engine(settings, |_| NullSink)?;
                 for (row, view) in rows.iter_mut().zip(&views) {
-                    engine.advance(std::slice::from_ref(view)).map_err(|e| self.tree_error(e))?;
+                    let report =
+                        engine.advance(std::slice::from_ref(view)).map_err(|e| self.tree_error(e))?;
                     let difference = self.oracle.compare(&engine);
                     row.wrong = Some(difference.map_or(0, |d| d.count as u64));
-                    if let Some(difference) = difference.filter(|_| strategy.is_exact()) {
+                    // What is carried over is not wrong, it is late.
+                    let is_exact = strategy.is_exact() && report.carried == 0;
+                    if let Some(difference) = difference.filter(|_| is_exact) {
                         return Err(CompareError::Wrong(Box::new(WrongCut {
                             scene: self.name.clone(),
                             path: path.name.clone(),

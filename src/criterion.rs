@@ -26,7 +26,7 @@
 
 use vertex_tree::Bounds;
 
-use crate::motion::Speed;
+use crate::motion::{Course, Speed};
 use crate::view::View;
 
 /// What "coarse" means: the second half of the refinement criterion.
@@ -108,46 +108,90 @@ impl Criterion {
         bound >= 0.0 && p2 * (view.cos_beta * view.cos_beta) <= bound * bound
     }
 
-    /// For a folded node, how many frames at full speed must pass before any view can want it unfolded; 0 if that
-    /// can not be said. Never late.
+    /// How large the error of a node is in the view that wants it most, in terms of the tolerance: at least 1 where one
+    /// wants it, infinite where an eye is in the sphere. For a node that no view wants, below 1, and 0 where it is out of
+    /// view. By screen error, a parent is never less urgent than its children.
+    #[must_use]
+    pub fn urgency(self, views: &[View], bounds: &Bounds) -> f64 {
+        let urgency = |view: &View| {
+            let s =
+                Situation::new(self, view, &Course::from(Speed { rho: 0.0, omega: 0.0, kappa: 0.0 }), bounds);
+            let (error, distance) = match self {
+                Self::ScreenError => (s.reach - s.r, s.d - s.r),
+                Self::SphereSize => (s.reach, s.d),
+            };
+            match (s.d < s.r, s.gap <= 0.0) {
+                (true, _) => f64::INFINITY,
+                (_, true) => error / distance.max(f64::MIN_POSITIVE),
+                (_, false) => 0.0,
+            }
+        };
+        views.iter().map(urgency).fold(0.0, f64::max)
+    }
+
+    /// For a folded node, how many frames on a course must pass before any view can want it unfolded; 0 if that can not
+    /// be said. Never late.
     ///
-    /// In one frame at full speed the eye moves by at most `rho`, the direction turns by at most `omega` and `k`
-    /// changes by at most `kappa`. `f`, the signed distance from a convex cone, is 1-Lipschitz in the eye's
-    /// position. Turning the cone about the eye by `delta` is turning the centre about it, which moves it by at most
-    /// `d delta`. Any motion ends where a turn at the old eye followed by a translation ends, so after `t` frames
-    /// `f` has shrunk by at most `t (rho + omega d)`, with today's `d`. In the same time `d - R` has shrunk by at
-    /// most `t (rho + kappa dR/dk)`. Unfolding needs both to reach their marks: the later one counts. Entering the
-    /// sphere (the paper's `t_i`) is implied, as it means being visible, and `R >= r`.
+    /// In one frame on the course the eye moves by at most `rho` along the heading `h` and by at most `stray` in any
+    /// direction, the direction turns by at most `omega` and `k` changes by at most `kappa`.
+    ///
+    /// *Visible.* `f`, the signed distance from a convex cone, is 1-Lipschitz in the eye's position. Turning the cone
+    /// about the eye by `delta` is turning the centre about it, which moves it by at most `d delta`. Any motion ends where
+    /// a turn at the old eye followed by a translation ends, so after `t` frames `f` has shrunk by at most
+    /// `t (rho + stray + omega d)`, with today's `d`.
+    ///
+    /// *Coarse.* Let `u = D / d` today and `s` be how far the eye has moved along `u`. Then the distance is at least
+    /// `d - s` from then on, wherever the eye is, and after `t` frames `s <= t (rho max(0, h.u) + stray)`. In the same
+    /// time `R` has grown by at most `t kappa dR/dk`.
+    ///
+    /// Unfolding needs both to reach their marks: the later one counts. Entering the sphere (the paper's `t_i`) is
+    /// implied, as it means being visible, and `R >= r`.
     #[inline]
     #[must_use]
-    pub fn earliest_unfold(self, views: &[View], speed: &Speed, bounds: &Bounds) -> f64 {
-        views.iter().map(|view| self.earliest_unfold_for(view, speed, bounds)).fold(f64::INFINITY, f64::min)
+    pub fn earliest_unfold(self, views: &[View], course: &Course, bounds: &Bounds) -> f64 {
+        views.iter().map(|view| self.earliest_unfold_for(view, course, bounds)).fold(f64::INFINITY, f64::min)
     }
 
     #[inline(always)]
-    fn earliest_unfold_for(self, view: &View, speed: &Speed, bounds: &Bounds) -> f64 {
-        let s = Situation::new(self, view, bounds);
-        let visible = speed.frames(s.gap - s.slack, speed.rho + speed.omega * s.d);
-        let coarse = speed.frames(s.d - s.reach - s.reach_slack, speed.rho + speed.kappa * s.reach_slope);
+    fn earliest_unfold_for(self, view: &View, course: &Course, bounds: &Bounds) -> f64 {
+        let s = Situation::new(self, view, course, bounds);
+        let sideways = course.rho + course.stray + course.omega * s.d;
+        let visible = course.frames(s.gap - s.slack, sideways);
+        let nearer = course.rho * s.ahead.max(0.0) + course.stray + course.kappa * s.reach_slope;
+        let coarse = course.frames(s.d - s.reach - s.reach_slack, nearer);
         visible.max(coarse)
     }
 
-    /// For an active node, how many frames at full speed must pass before no view wants it unfolded any more; 0 if
+    /// For an active node, how many frames on a course must pass before no view wants it unfolded any more; 0 if
     /// that can not be said. Never late. The dual of [`earliest_unfold`](Self::earliest_unfold), which the paper
     /// leaves to the reader: a view lets go when the eye is outside the sphere *and* the node is invisible *or* no
     /// longer coarse, and the last view counts.
+    ///
+    /// *No longer coarse.* With `s` as there and `p` how far the eye has moved across `u`, the distance is now
+    /// `sqrt((d - s)^2 + p^2)`. If `s < 0` that is at most `d + |s| + p^2 / 2d`; if `0 <= s <= 2d`, at most
+    /// `d + p^2 / 2d`; if `s > 2d`, at most `d + l` where `l` is how far the eye has moved at all, and
+    /// `l <= l^2 / 2d`. So after `t` frames it has grown by at most `b t + c t^2`, with
+    /// `b = rho max(0, -h.u) + stray + kappa dR/dk` and `c = (rho + stray)^2 / 2d`: the slack `w = R - d` lasts for
+    /// `t = 2w / (b + sqrt(b^2 + 4cw))`, and for no less than `w / (rho + stray + kappa dR/dk)`.
     #[inline]
     #[must_use]
-    pub fn earliest_fold(self, views: &[View], speed: &Speed, bounds: &Bounds) -> f64 {
-        views.iter().map(|view| self.earliest_fold_for(view, speed, bounds)).fold(0.0, f64::max)
+    pub fn earliest_fold(self, views: &[View], course: &Course, bounds: &Bounds) -> f64 {
+        views.iter().map(|view| self.earliest_fold_for(view, course, bounds)).fold(0.0, f64::max)
     }
 
     #[inline(always)]
-    fn earliest_fold_for(self, view: &View, speed: &Speed, bounds: &Bounds) -> f64 {
-        let s = Situation::new(self, view, bounds);
-        let outside = speed.frames(s.r - s.d - s.slack, speed.rho);
-        let invisible = speed.frames(-s.gap - s.slack, speed.rho + speed.omega * s.d);
-        let fine = speed.frames(s.reach - s.d - s.reach_slack, speed.rho + speed.kappa * s.reach_slope);
+    fn earliest_fold_for(self, view: &View, course: &Course, bounds: &Bounds) -> f64 {
+        let s = Situation::new(self, view, course, bounds);
+        let any = course.rho + course.stray;
+        let outside = course.frames(s.r - s.d - s.slack, any);
+        let invisible = course.frames(-s.gap - s.slack, any + course.omega * s.d);
+        let slack = s.reach - s.d - s.reach_slack;
+        let steered = course.kappa * s.reach_slope;
+        let farther = course.rho * (-s.ahead).max(0.0) + course.stray + steered;
+        // 4 c w, where the root would not be lost in b.
+        let bending = 2.0 * any * any * slack.max(0.0) / s.d.max(f64::MIN_POSITIVE);
+        let bent = 0.5 * (farther + (farther * farther + bending).sqrt());
+        let fine = course.frames(slack, bent.min(any + steered));
         outside.max(invisible.min(fine))
     }
 }
@@ -158,6 +202,8 @@ struct Situation {
     d: f64,
     /// Radius of the sphere.
     r: f64,
+    /// `h.u`: the cosine of the angle between the course's heading and the centre.
+    ahead: f64,
     /// `f - r`: how far the sphere is from the cone, negative where it reaches into it.
     gap: f64,
     /// Distance within which the node is coarse, and how fast that grows with `k`.
@@ -170,7 +216,7 @@ struct Situation {
 
 impl Situation {
     #[inline(always)]
-    fn new(criterion: Criterion, view: &View, bounds: &Bounds) -> Self {
+    fn new(criterion: Criterion, view: &View, course: &Course, bounds: &Bounds) -> Self {
         let dx = f64::from(bounds.center[0]) - view.eye.x;
         let dy = f64::from(bounds.center[1]) - view.eye.y;
         let dz = f64::from(bounds.center[2]) - view.eye.z;
@@ -185,8 +231,10 @@ impl Situation {
             p * view.cos_beta - a * view.sin_beta
         };
         let (reach, reach_slope) = criterion.reach(bounds, view.k);
+        let along = dx * course.heading.x + dy * course.heading.y + dz * course.heading.z;
+        let ahead = if d > 0.0 { along / d } else { 0.0 };
         // p near the axis is only good to sqrt(epsilon) d, but there f is far from both marks unless r is larger.
         let (slack, reach_slack) = (SLACK * (d + r), SLACK * (d + reach));
-        Self { d, r, gap: f - r, reach, reach_slope, slack, reach_slack }
+        Self { d, r, ahead, gap: f - r, reach, reach_slope, slack, reach_slack }
     }
 }

@@ -7,13 +7,14 @@
 //!
 //! Everything here runs on the caller's thread. A backend may have threads of its own; no call waits for them.
 
+use std::collections::BinaryHeap;
 use std::time::{Duration, Instant};
 
 use vertex_tree::{MeshSink, NodeId, PageStats, Step, TreeError, VertexTree};
 
-use crate::budget::{Budget, Steering};
+use crate::budget::{Budget, FOLDING_SHARE, Steering, WorkCap};
 use crate::criterion::Criterion;
-use crate::front::Front;
+use crate::front::{Front, Slot};
 use crate::motion::{Odometer, Speed};
 use crate::queue::Kind;
 use crate::refine::{Finder, Flips, Frame, Strategy};
@@ -32,6 +33,8 @@ pub struct Settings {
     pub omega: f64,
     /// What a frame may cost.
     pub budget: Budget,
+    /// What a frame may do.
+    pub work_cap: WorkCap,
 }
 
 impl Default for Settings {
@@ -43,6 +46,7 @@ impl Default for Settings {
             rho: 1.0,
             omega: 0.02,
             budget: Budget::None,
+            work_cap: WorkCap::None,
         }
     }
 }
@@ -58,6 +62,8 @@ pub enum Limit {
     Time,
     /// Pages that were not in memory.
     Io,
+    /// The cap on a frame's work.
+    Work,
 }
 
 impl Limit {
@@ -69,6 +75,7 @@ impl Limit {
             Self::Triangles => "triangles",
             Self::Time => "time",
             Self::Io => "io",
+            Self::Work => "work",
         }
     }
 }
@@ -88,6 +95,8 @@ pub struct FrameReport {
     pub folds: u64,
     /// Those of the unfolds that no view wanted: another node needed them.
     pub forced: u64,
+    /// Wanted changes left to later frames by the cap on work.
+    pub carried: u64,
     /// Wanted changes that a rule of the backend's own forbade, see [`Step::Blocked`].
     pub blocked: u64,
     /// Wanted changes that the backend refused for want of a page.
@@ -104,9 +113,15 @@ pub struct FrameReport {
     pub pages: PageStats,
 }
 
+/// A node in play and the slot that it was in when this was noted. By the time its turn comes it may have gone out of
+/// play and another node may have come to the slot.
+type Noted = (Slot, NodeId);
+
 /// A node waiting on the stack for its turn.
 #[derive(Clone, Copy, PartialEq)]
 struct Pending {
+    /// Where the node is, if it is known to be in play.
+    slot: Slot,
     node: NodeId,
     /// Whether an entry below waits for this one: a dependency, not something that a view wants.
     needed: bool,
@@ -115,11 +130,11 @@ struct Pending {
 }
 
 impl Pending {
-    fn wanted(node: NodeId) -> Self {
-        Self { node, needed: false, waits: false }
+    fn wanted((slot, node): Noted) -> Self {
+        Self { slot, node, needed: false, waits: false }
     }
     fn needed(node: NodeId) -> Self {
-        Self { node, needed: true, waits: false }
+        Self { slot: Slot::NONE, node, needed: true, waits: false }
     }
 }
 
@@ -129,6 +144,16 @@ struct Counts {
     unfolds: u64,
     folds: u64,
     forced: u64,
+    carried: u64,
+}
+
+/// A change that waits for its turn where work is capped. The most urgent one is the greatest.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
+struct Urgent {
+    /// Bits of a number that is not negative, which are in the same order.
+    urgency: u64,
+    slot: Slot,
+    node: NodeId,
 }
 
 /// A front through a hierarchy of backend `T`, reporting the displayed mesh to `M`.
@@ -148,7 +173,10 @@ pub struct Engine<T, M> {
     stack: Vec<Pending>,
     missing: Vec<NodeId>,
     blocked: Vec<NodeId>,
-    still_needed: Vec<NodeId>,
+    still_needed: Vec<Noted>,
+    folding: Vec<Noted>,
+    unfolding: Vec<Noted>,
+    urgent: [BinaryHeap<Urgent>; 2],
     arrived: Vec<NodeId>,
     drawing_time: Duration,
 }
@@ -159,10 +187,8 @@ impl<T: VertexTree, M: MeshSink> Engine<T, M> {
     /// # Errors
     /// What the backend reports.
     pub fn new(mut tree: T, mut mesh: M, settings: Settings) -> Result<Self, TreeError> {
-        let limit = tree.node_limit();
-        let roots: Vec<_> = tree.roots().iter().map(|&root| (root, tree.bounds(root))).collect();
-        let mut front = Front::new(limit);
-        let mut finder = Finder::new(settings.strategy, limit);
+        let front = Front::new(&tree);
+        let mut finder = Finder::new(settings.strategy);
         // No views yet: every root is due, whatever the first frame brings.
         let frame = Frame {
             criterion: settings.criterion,
@@ -170,9 +196,8 @@ impl<T: VertexTree, M: MeshSink> Engine<T, M> {
             speed: Speed { rho: settings.rho, omega: settings.omega, kappa: 0.0 },
             motion: crate::motion::Motion::Unbounded,
         };
-        front.add_roots(&roots);
-        for (root, bounds) in roots {
-            finder.watch(&frame, root, Kind::Unfold, bounds);
+        for root in front.roots() {
+            finder.watch(&frame, root, Kind::Unfold, front.bounds(root));
         }
         tree.base_mesh(&mut mesh)?;
         Ok(Self {
@@ -191,6 +216,9 @@ impl<T: VertexTree, M: MeshSink> Engine<T, M> {
             missing: Vec::new(),
             blocked: Vec::new(),
             still_needed: Vec::new(),
+            folding: Vec::new(),
+            unfolding: Vec::new(),
+            urgent: Default::default(),
             arrived: Vec::new(),
             drawing_time: Duration::ZERO,
         })
@@ -232,6 +260,11 @@ impl<T: VertexTree, M: MeshSink> Engine<T, M> {
         self.steering.set_budget(budget);
     }
 
+    /// Sets another cap on a frame's work from the next frame on.
+    pub fn set_work_cap(&mut self, work_cap: WorkCap) {
+        self.settings.work_cap = work_cap;
+    }
+
     /// Adds what drawing took to the frame time that the next [`advance`](Self::advance) steers by.
     pub fn add_frame_time(&mut self, drawing: Duration) {
         self.drawing_time += drawing;
@@ -264,7 +297,7 @@ impl<T: VertexTree, M: MeshSink> Engine<T, M> {
             self.kappa = kappa;
         }
         let speed = Speed { rho: self.settings.rho, omega: self.settings.omega, kappa: self.kappa };
-        let mut motion = self.odometer.advance(&speed, &self.before, &self.views);
+        let mut motion = self.odometer.advance(&speed.into(), &self.before, &self.views);
         if redeclared {
             motion = crate::motion::Motion::Unbounded;
         }
@@ -286,14 +319,21 @@ impl<T: VertexTree, M: MeshSink> Engine<T, M> {
             missing: &mut self.missing,
             blocked: &mut self.blocked,
             still_needed: &mut self.still_needed,
+            folding: &mut self.folding,
+            unfolding: &mut self.unfolding,
             counts: Counts::default(),
             tests: 0,
         };
         step.missing.clear();
         step.blocked.clear();
-        let applied = step.apply(&self.flips);
+        note(step.front, &self.flips.fold, step.folding);
+        note(step.front, &self.flips.unfold, step.unfolding);
+        let applied = match self.settings.work_cap {
+            WorkCap::None => step.apply(),
+            cap => step.apply_within(cap, found, &mut self.urgent),
+        };
         if applied.is_err() {
-            step.abandon(&self.flips);
+            step.abandon();
         }
         let (counts, tests) = (step.counts, self.flips.tests + step.tests);
         let distinct = |nodes: &mut Vec<NodeId>| {
@@ -311,6 +351,7 @@ impl<T: VertexTree, M: MeshSink> Engine<T, M> {
         let triangles = self.tree.displayed_triangles();
         let limit = match self.steering.budget() {
             _ if misses > 0 => Limit::Io,
+            _ if counts.carried > 0 => Limit::Work,
             Budget::Triangles(_) if self.steering.limits() => Limit::Triangles,
             Budget::FrameTime(_) if self.steering.limits() => Limit::Time,
             _ => Limit::Error,
@@ -325,6 +366,7 @@ impl<T: VertexTree, M: MeshSink> Engine<T, M> {
             unfolds: counts.unfolds,
             folds: counts.folds,
             forced: counts.forced,
+            carried: counts.carried,
             blocked,
             misses,
             active_nodes: self.front.active_nodes() as u64,
@@ -336,9 +378,11 @@ impl<T: VertexTree, M: MeshSink> Engine<T, M> {
     }
 }
 
-/// Changes whose memory is fetched together: enough to keep every channel to it busy, few enough to stay in the
-/// nearest cache.
-const PREPARED: usize = 32;
+/// Changes that are made before the next ones are prepared.
+const TOGETHER: usize = 8;
+
+/// Steps of preparation that are taken.
+const MOST_STEPS: usize = 8;
 
 /// Carries out status changes and what follows from them.
 struct Steps<'a, T, M> {
@@ -353,141 +397,221 @@ struct Steps<'a, T, M> {
     /// Nodes whose change a rule of the backend's own forbade; some more than once.
     blocked: &'a mut Vec<NodeId>,
     /// Nodes that no view wants and that something else still needs.
-    still_needed: &'a mut Vec<NodeId>,
+    still_needed: &'a mut Vec<Noted>,
+    /// Collapsible nodes to fold and boundary nodes to unfold, in this order. What follows from a change goes to the end,
+    /// so that its memory is fetched with that of others too.
+    folding: &'a mut Vec<Noted>,
+    unfolding: &'a mut Vec<Noted>,
     counts: Counts,
     tests: u64,
 }
 
 impl<T: VertexTree, M: MeshSink> Steps<'_, T, M> {
     /// Folds, then unfolds, and whatever follows.
-    fn apply(&mut self, flips: &Flips) -> Result<(), TreeError> {
-        for nodes in flips.fold.chunks(PREPARED) {
-            self.prepare(nodes);
-            for &node in nodes {
-                self.fold(node)?;
-            }
-        }
-        for nodes in flips.unfold.chunks(PREPARED) {
-            self.prepare(nodes);
-            for &node in nodes {
-                self.unfold(node)?;
-            }
-        }
-        // What was needed when its turn came may have been let go since.
+    fn apply(&mut self) -> Result<(), TreeError> {
+        self.take_turns(Kind::Fold)?;
+        self.take_turns(Kind::Unfold)?;
+        self.let_go()
+    }
+
+    /// What was needed when its turn came may have been let go since.
+    fn let_go(&mut self) -> Result<(), TreeError> {
         let mut before = None;
         while !self.still_needed.is_empty() && before != Some(self.counts.folds) {
             before = Some(self.counts.folds);
-            for at in 0..self.still_needed.len() {
-                self.fold(self.still_needed[at])?;
-            }
+            self.folding.clear();
+            self.folding.append(self.still_needed);
+            self.take_turns(Kind::Fold)?;
             let front = &*self.front;
             self.still_needed.sort_unstable();
             self.still_needed.dedup();
-            self.still_needed.retain(|&node| front.is_collapsible(node));
+            self.still_needed.retain(|&noted| is_collapsible(front, noted));
         }
-        while let Some(node) = self.still_needed.pop() {
-            self.refused(node, Kind::Fold);
+        while let Some((slot, _)) = self.still_needed.pop() {
+            self.refused(slot, Kind::Fold);
         }
         Ok(())
+    }
+
+    /// The same within a cap, most urgent first. `start` is when the work began.
+    fn apply_within(
+        &mut self,
+        cap: WorkCap,
+        start: Instant,
+        [folds, unfolds]: &mut [BinaryHeap<Urgent>; 2],
+    ) -> Result<(), TreeError> {
+        let is_spent = |counts: &Counts, share: f64| match cap {
+            WorkCap::None => false,
+            WorkCap::Changes(most) => (counts.folds + counts.unfolds) as f64 >= most as f64 * share,
+            WorkCap::Time(most) => start.elapsed() >= most.mul_f64(share),
+        };
+        let mut result = Ok(());
+        // Folds that must not wait, unfolds, and folds again with what is left.
+        for (kind, share) in [(Kind::Fold, FOLDING_SHARE), (Kind::Unfold, 1.0), (Kind::Fold, 1.0)] {
+            let heap = if kind == Kind::Fold { &mut *folds } else { &mut *unfolds };
+            loop {
+                // At first all that was found, later what follows from a change.
+                self.await_turn(kind, heap);
+                if result.is_err() || is_spent(&self.counts, share) {
+                    break;
+                }
+                let Some(Urgent { slot, node, .. }) = heap.pop() else { break };
+                result = match kind {
+                    Kind::Fold => self.fold((slot, node)),
+                    Kind::Unfold => self.unfold((slot, node)),
+                };
+            }
+        }
+        for (kind, heap) in [(Kind::Fold, folds), (Kind::Unfold, unfolds)] {
+            for Urgent { slot, node, .. } in heap.drain() {
+                let is_still = if kind == Kind::Fold { is_collapsible } else { is_boundary };
+                if is_still(self.front, (slot, node)) {
+                    self.counts.carried += 1;
+                    self.refused(slot, kind);
+                }
+            }
+        }
+        result.and_then(|()| self.let_go())
+    }
+
+    /// Moves the changes found so far to a heap.
+    fn await_turn(&mut self, kind: Kind, heap: &mut BinaryHeap<Urgent>) {
+        let list = if kind == Kind::Fold { &mut *self.folding } else { &mut *self.unfolding };
+        heap.extend(list.drain(..).map(|(slot, node)| {
+            let urgency = self.frame.criterion.urgency(self.frame.views, &self.front.record(slot).bounds);
+            // Of what is to be folded, the least wanted first.
+            let urgency = if kind == Kind::Fold { 1.0 - urgency.min(1.0) } else { urgency };
+            Urgent { urgency: urgency.max(0.0).to_bits(), slot, node }
+        }));
     }
 
     /// The backend can not go on: whatever was to change is to be looked at again when it can.
-    fn abandon(&mut self, flips: &Flips) {
-        let pending = self.stack.drain(..).map(|pending| pending.node);
-        let mut nodes: Vec<NodeId> = pending.chain(self.still_needed.drain(..)).collect();
-        nodes.extend(flips.fold.iter().chain(&flips.unfold));
-        for node in nodes {
-            if self.front.is_collapsible(node) {
-                self.refused(node, Kind::Fold);
-            } else if self.front.is_boundary(node) {
-                self.refused(node, Kind::Unfold);
+    fn abandon(&mut self) {
+        let pending = self.stack.drain(..).map(|pending| (pending.slot, pending.node));
+        let mut all: Vec<Noted> = pending.chain(self.still_needed.drain(..)).collect();
+        all.extend(self.folding.iter().chain(&*self.unfolding));
+        for (slot, node) in all {
+            let slot = if slot == Slot::NONE { self.front.find(self.tree, node) } else { slot };
+            if is_collapsible(self.front, (slot, node)) {
+                self.refused(slot, Kind::Fold);
+            } else if is_boundary(self.front, (slot, node)) {
+                self.refused(slot, Kind::Unfold);
             }
         }
     }
 
-    fn prepare(&self, nodes: &[NodeId]) {
-        self.front.prepare(nodes);
-        self.tree.prepare(nodes);
-    }
-
-    fn wanted(&mut self, node: NodeId) -> bool {
-        self.tests += 1;
-        self.frame.unfold(&self.front.bounds(node))
-    }
-
-    fn watch(&mut self, node: NodeId, kind: Kind) {
-        self.finder.watch(self.frame, node, kind, self.front.bounds(node));
-    }
-
-    fn refused(&mut self, node: NodeId, kind: Kind) {
-        self.finder.unwatch(node);
-        self.finder.refused(self.frame, node, kind, self.front.bounds(node));
-    }
-
-    /// Folds a collapsible node that no view wants, then as many of its ancestors as follow.
-    fn fold(&mut self, node: NodeId) -> Result<(), TreeError> {
-        self.stack.push(Pending::wanted(node));
-        while let Some(&Pending { node, .. }) = self.stack.last() {
-            if !self.front.is_collapsible(node) {
-                self.stack.pop();
-                continue;
+    /// Changes the nodes of a list, which may grow meanwhile. While some change, those whose turn comes next are prepared,
+    /// the further off the less.
+    #[inline(always)]
+    fn take_turns(&mut self, kind: Kind) -> Result<(), TreeError> {
+        let mut prepared = [0; MOST_STEPS];
+        let steps = T::PREPARATION.clamp(1, MOST_STEPS);
+        let mut done = 0;
+        while done < self.list(kind).len() {
+            for (step, prepared) in prepared[..steps].iter_mut().enumerate() {
+                let end = self.list(kind).len().min(done + TOGETHER * (steps - step));
+                for &(slot, node) in &self.list(kind)[*prepared..end] {
+                    if step == 0 {
+                        self.front.prefetch_linked(slot);
+                        self.finder.prefetch(slot);
+                    }
+                    self.tree.prepare(node, step, self.mesh);
+                }
+                *prepared = end;
             }
-            let step = self.tree.fold(node, self.mesh)?;
-            self.stack.pop();
-            match step {
-                Step::Done => {}
-                Step::NotResident => {
-                    self.missing.push(node);
-                    self.refused(node, Kind::Fold);
-                    continue;
-                }
-                Step::Blocked => {
-                    self.blocked.push(node);
-                    self.refused(node, Kind::Fold);
-                    continue;
-                }
-                Step::StillNeeded | Step::Needs(_) => {
-                    self.still_needed.push(node);
-                    continue;
+            let end = self.list(kind).len().min(done + TOGETHER);
+            for at in done..end {
+                match kind {
+                    Kind::Fold => self.fold(self.folding[at])?,
+                    Kind::Unfold => self.unfold(self.unfolding[at])?,
                 }
             }
-            self.counts.folds += 1;
-            for child in self.tree.children(node) {
-                self.finder.unwatch(child);
-            }
-            self.finder.unwatch(node);
-            self.front.set_folded(&*self.tree, node);
-            self.watch(node, Kind::Unfold);
-            let above = self.stack.len();
-            self.stack.extend(self.tree.parents(node).map(Pending::wanted));
-            self.retain_above(above, |steps, parent| {
-                if !steps.front.is_collapsible(parent) {
-                    return false;
-                }
-                let wanted = steps.wanted(parent);
-                if wanted {
-                    steps.watch(parent, Kind::Fold);
-                }
-                !wanted
-            });
+            done = end;
         }
         Ok(())
     }
 
-    /// Unfolds a boundary node that some view wants, then as many of its descendants as are wanted too, and before
-    /// any of them what the backend says it needs.
-    fn unfold(&mut self, node: NodeId) -> Result<(), TreeError> {
-        self.stack.push(Pending::wanted(node));
-        while let Some(&Pending { node, needed, .. }) = self.stack.last() {
-            if self.front.is_active(node) {
+    #[inline(always)]
+    fn list(&self, kind: Kind) -> &Vec<Noted> {
+        match kind {
+            Kind::Fold => self.folding,
+            Kind::Unfold => self.unfolding,
+        }
+    }
+
+    fn wanted(&mut self, slot: Slot) -> bool {
+        self.tests += 1;
+        self.frame.unfold(&self.front.record(slot).bounds)
+    }
+
+    fn watch(&mut self, slot: Slot, kind: Kind) {
+        self.finder.watch(self.frame, slot, kind, self.front.bounds(slot));
+    }
+
+    fn refused(&mut self, slot: Slot, kind: Kind) {
+        self.finder.unwatch(slot);
+        self.finder.refused(slot, kind, self.front.bounds(slot));
+    }
+
+    /// Folds a collapsible node that no view wants. Parents that no view wants either follow, once they can.
+    fn fold(&mut self, (slot, node): Noted) -> Result<(), TreeError> {
+        if !is_collapsible(self.front, (slot, node)) {
+            return Ok(());
+        }
+        match self.tree.fold(node, self.mesh)? {
+            Step::Done => {}
+            Step::NotResident => {
+                self.missing.push(node);
+                self.refused(slot, Kind::Fold);
+                return Ok(());
+            }
+            Step::Blocked => {
+                self.blocked.push(node);
+                self.refused(slot, Kind::Fold);
+                return Ok(());
+            }
+            Step::StillNeeded | Step::Needs(_) => {
+                self.still_needed.push((slot, node));
+                return Ok(());
+            }
+        }
+        self.counts.folds += 1;
+        for child in self.front.children(self.tree, slot) {
+            self.finder.unwatch(child);
+        }
+        self.finder.unwatch(slot);
+        self.front.set_folded(self.tree, slot);
+        self.watch(slot, Kind::Unfold);
+        for parent in self.front.parents(self.tree, slot) {
+            let record = self.front.record(parent);
+            if record.is_collapsible() {
+                self.tests += 1;
+                if self.frame.unfold(&record.bounds) {
+                    self.finder.watch(self.frame, parent, Kind::Fold, record.bounds);
+                } else {
+                    self.folding.push((parent, record.node));
+                }
+            }
+        }
+        Ok(())
+    }
+
+    /// Unfolds a boundary node that some view wants, and before it what the backend says it needs. Children that are
+    /// wanted too follow.
+    fn unfold(&mut self, noted: Noted) -> Result<(), TreeError> {
+        self.stack.push(Pending::wanted(noted));
+        while let Some(&Pending { slot, node, needed, .. }) = self.stack.last() {
+            let slot = if slot == Slot::NONE { self.front.find(self.tree, node) } else { slot };
+            if self.front.node(slot) == node && self.front.record(slot).is_active() {
                 self.stack.pop();
                 continue;
             }
-            if !self.front.is_boundary(node) {
+            if !is_boundary(self.front, (slot, node)) {
                 // A needed node below folded ones: its ancestors come first.
                 let above = self.stack.len();
-                let (front, parents) = (&*self.front, self.tree.parents(node));
-                self.stack.extend(parents.filter(|&p| !front.is_active(p)).map(Pending::needed));
+                let (front, tree) = (&*self.front, &*self.tree);
+                let is_folded = |p: &NodeId| !front.record(front.find(tree, *p)).is_active();
+                self.stack.extend(tree.parents(node).filter(is_folded).map(Pending::needed));
                 if (above..self.stack.len()).any(|at| self.waits(self.stack[at].node)) {
                     self.give_up();
                 } else {
@@ -497,7 +621,7 @@ impl<T: VertexTree, M: MeshSink> Steps<'_, T, M> {
             }
             match self.tree.unfold(node, self.mesh)? {
                 Step::Done => {}
-                Step::Needs(other) if !self.front.is_active(other) && !self.waits(other) => {
+                Step::Needs(other) if !self.is_active(other) && !self.waits(other) => {
                     if let Some(pending) = self.stack.last_mut() {
                         pending.waits = true;
                     }
@@ -517,45 +641,34 @@ impl<T: VertexTree, M: MeshSink> Steps<'_, T, M> {
             }
             self.stack.pop();
             self.counts.unfolds += 1;
-            if needed && !self.wanted(node) {
+            if needed && !self.wanted(slot) {
                 self.counts.forced += 1;
             }
-            self.finder.unwatch(node);
-            for parent in self.tree.parents(node) {
-                if self.front.is_collapsible(parent) {
+            self.finder.unwatch(slot);
+            for parent in self.front.parents(self.tree, slot) {
+                if self.front.record(parent).is_collapsible() {
                     self.finder.unwatch(parent);
                 }
             }
-            self.front.set_active(&*self.tree, node);
-            self.watch(node, Kind::Fold);
-            let above = self.stack.len();
-            self.stack.extend(self.tree.children(node).map(Pending::wanted));
-            self.retain_above(above, |steps, child| {
-                if !T::IS_TREE && !steps.front.is_boundary(child) {
-                    return false;
+            self.front.set_active(self.tree, slot);
+            self.watch(slot, Kind::Fold);
+            for child in self.front.children(self.tree, slot) {
+                let record = self.front.record(child);
+                if T::IS_TREE || record.is_boundary() {
+                    self.tests += 1;
+                    if self.frame.unfold(&record.bounds) {
+                        self.unfolding.push((child, record.node));
+                    } else {
+                        self.finder.watch(self.frame, child, Kind::Unfold, record.bounds);
+                    }
                 }
-                let wanted = steps.wanted(child);
-                if !wanted {
-                    steps.watch(child, Kind::Unfold);
-                }
-                wanted
-            });
+            }
         }
         Ok(())
     }
 
-    /// Drops the entries of the stack from `above` on that `keep` does not want kept.
-    #[inline(always)]
-    fn retain_above(&mut self, above: usize, mut keep: impl FnMut(&mut Self, NodeId) -> bool) {
-        let mut kept = above;
-        for at in above..self.stack.len() {
-            let pending = self.stack[at];
-            if keep(self, pending.node) {
-                self.stack[kept] = pending;
-                kept += 1;
-            }
-        }
-        self.stack.truncate(kept);
+    fn is_active(&self, node: NodeId) -> bool {
+        self.front.record(self.front.find(self.tree, node)).is_active()
     }
 
     /// Whether a node waits for the one on top of the stack, directly or by way of others. To need it then is a cycle
@@ -568,13 +681,37 @@ impl<T: VertexTree, M: MeshSink> Steps<'_, T, M> {
 
     /// The node on top of the stack can not be unfolded in this frame, and with it nothing that waits for it.
     fn give_up(&mut self) {
-        while let Some(Pending { node, needed, .. }) = self.stack.pop() {
-            if self.front.is_boundary(node) {
-                self.refused(node, Kind::Unfold);
+        while let Some(Pending { slot, node, needed, .. }) = self.stack.pop() {
+            let slot = if slot == Slot::NONE { self.front.find(self.tree, node) } else { slot };
+            if is_boundary(self.front, (slot, node)) {
+                self.refused(slot, Kind::Unfold);
             }
             if !needed {
                 break;
             }
         }
     }
+}
+
+/// Looks up the nodes in some slots, before anything changes.
+fn note(front: &Front, slots: &[Slot], noted: &mut Vec<Noted>) {
+    noted.clear();
+    for slots in slots.chunks(32) {
+        slots.iter().for_each(|&slot| front.prefetch(slot));
+        noted.extend(slots.iter().map(|&slot| (slot, front.node(slot))));
+    }
+}
+
+/// Whether a node that was noted is still in its slot and collapsible.
+#[inline(always)]
+fn is_collapsible(front: &Front, (slot, node): Noted) -> bool {
+    let record = front.record(slot);
+    record.node == node && record.is_collapsible()
+}
+
+/// Whether a node that was noted is still in its slot and a boundary node.
+#[inline(always)]
+fn is_boundary(front: &Front, (slot, node): Noted) -> bool {
+    let record = front.record(slot);
+    record.node == node && record.is_boundary()
 }

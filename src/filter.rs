@@ -25,7 +25,7 @@
 use vertex_tree::Bounds;
 
 use crate::criterion::Criterion;
-use crate::motion::Speed;
+use crate::motion::Course;
 use crate::packed::{Block, LANES};
 use crate::view::View;
 
@@ -35,6 +35,9 @@ const VISIBLE_BAND: f32 = 64.0 / 16_777_216.0;
 /// The square of this is a normal number, and products of it with the factors above are not lost among the
 /// subnormal ones.
 const TINY: f32 = 1e-18;
+/// Far from the subnormal numbers, and from infinity.
+const TINIEST: f32 = 1e-30;
+const HUGEST: f32 = 1e30;
 
 /// A view rounded to f32, with the criterion's form of `R = r k_radius + eps k_eps`.
 #[derive(Clone, Copy, Debug)]
@@ -114,58 +117,95 @@ pub(crate) fn certainly<const WANTED: bool>(block: &Block, lenses: &[Lens]) -> [
     certain
 }
 
-/// For each entry of a block, how many frames at full speed must pass before its status can have to change: a boundary
-/// node's where the tag is 0, otherwise a collapsible one's. Never late; 0 where the filter can not say.
+/// A course in f32, with speeds rounded up: one that f32 can not hold would be none at all.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Rates {
+    heading: [f32; 3],
+    rho: f32,
+    stray: f32,
+    /// `rho + stray`.
+    any: f32,
+    omega: f32,
+    kappa: f32,
+}
+
+impl Rates {
+    pub fn new(course: &Course) -> Self {
+        let up = |x: f64| if x > 0.0 { (x as f32).next_up() } else { 0.0 };
+        let &Course { heading, rho, stray, omega, kappa } = course;
+        Self {
+            heading: heading.as_vec3().to_array(),
+            rho: up(rho),
+            stray: up(stray),
+            any: up(rho + stray),
+            omega: up(omega),
+            kappa: up(kappa),
+        }
+    }
+}
+
+/// For each entry of a block, how many frames on a course must pass before its status can have to change: a boundary
+/// node's where the tag is even, otherwise a collapsible one's. Never late; 0 where the filter can not say.
 ///
-/// The time bounds of [`Criterion::earliest_unfold`] and [`Criterion::earliest_fold`], taken at the ends of the error
-/// band. `f` is computed from both ends of the band of `p^2`, as near the axis the root magnifies it.
+/// The time bounds of [`Criterion::earliest_unfold`] and [`Criterion::earliest_fold`], taken at that end of the error
+/// band which makes them earlier: for an unfolding the nearer one, for a folding the farther one. `p` is taken from that
+/// end of the band of `p^2`, as near the axis the root magnifies it.
+///
+/// Whether the apex or the line is the nearest part of the cone is certain where `q = a cos beta + p sin beta` is far
+/// enough from 0. The other end of the band of `p` is at most `sqrt(2 band) < 0.0028 (M + t)` away.
+///
+/// Rates that depend on the heading are multiplied by `d`, or rather a little less, so that one division serves.
 #[inline(always)]
-pub(crate) fn earliest(block: &Block, lenses: &[Lens], speed: &Speed) -> [f32; LANES] {
-    // Rounded up, or a speed that f32 can not hold would be none at all.
-    let up = |x: f64| if x > 0.0 { (x as f32).next_up() } else { 0.0 };
-    let (rho, omega, kappa) = (up(speed.rho), up(speed.omega), up(speed.kappa));
-    let mut folds = [0.0_f32; LANES];
-    let mut unfolds = [f32::INFINITY; LANES];
+pub(crate) fn earliest(block: &Block, lenses: &[Lens], rates: &Rates) -> [f32; LANES] {
+    let &Rates { heading, rho, stray, any, omega, kappa } = rates;
+    let per_any = (1.0 - 1.0 / 1_048_576.0) / rate(any);
+    let mut earliest: [f32; LANES] =
+        std::array::from_fn(|i| if block.tag[i] & 1 == 0 { f32::INFINITY } else { 0.0 });
     for lens in lenses {
         for i in 0..LANES {
+            let unfolds = block.tag[i] & 1 == 0;
             let (x, y, z) = (block.x[i] - lens.eye[0], block.y[i] - lens.eye[1], block.z[i] - lens.eye[2]);
             let (r, eps) = (block.radius[i], block.eps[i]);
             let d2 = x * x + y * y + z * z;
             let d = d2.sqrt();
             let reach = r * lens.k_radius + eps * lens.k_eps;
-            let reach_slope = r * lens.slope_radius + eps * lens.slope_eps;
+            let steered = kappa * (r * lens.slope_radius + eps * lens.slope_eps);
             let margin = MARGIN * (lens.eye_length + d + r) + TINY;
             let coarse_band = margin + MARGIN * reach;
             let a = x * lens.direction[0] + y * lens.direction[1] + z * lens.direction[2];
-            let p2 = d2 - a * a;
             let t = d + r + margin;
             let band = VISIBLE_BAND * t * (lens.eye_length + t);
-            let p_low = larger(p2 - band, 0.0).sqrt();
-            let p_high = (p2 + band).sqrt();
+            let p = larger(d2 - a * a + if unfolds { -band } else { band }, 0.0).sqrt();
             // Behind the apex, the distance from the cone is that from the eye, and never less than that from its line.
-            let line_low = p_low * lens.cos_beta - a * lens.sin_beta;
-            let line_high = p_high * lens.cos_beta - a * lens.sin_beta;
-            let behind = a * lens.cos_beta + p_high * lens.sin_beta < -margin;
-            let ahead = a * lens.cos_beta + p_low * lens.sin_beta > margin;
-            let f_low = if behind { d } else { line_low };
-            let f_high = if ahead { line_high } else { d };
+            let line = p * lens.cos_beta - a * lens.sin_beta;
+            let q = a * lens.cos_beta + p * lens.sin_beta;
+            let unsure = margin + 0.0028 * (lens.eye_length + t);
+            let is_line = if unfolds { q >= -unsure } else { q > unsure };
+            let f = if is_line { line } else { d };
 
-            let sideways = rate(rho + omega * (d + margin));
-            let towards = rate(rho + kappa * reach_slope);
-            let appears = frames(f_low - r - 2.0 * margin, sideways);
-            let disappears = frames(r - f_high - 2.0 * margin, sideways);
-            let coarse = frames(d - reach - 2.0 * coarse_band, towards);
-            let fine = frames(reach - d - 2.0 * coarse_band, towards);
-            let outside = frames(r - d - 2.0 * margin, rate(rho));
-            unfolds[i] = smaller(unfolds[i], larger(appears, coarse));
-            folds[i] = larger(folds[i], larger(outside, smaller(disappears, fine)));
+            let sign = if unfolds { 1.0 } else { -1.0 };
+            let sideways = frames(sign * (f - r) - 2.0 * margin, rate(any + omega * (d + margin)));
+
+            let near = larger(d - margin, TINY);
+            let along = sign * (x * heading[0] + y * heading[1] + z * heading[2]) + margin;
+            let towards = rho * smaller(larger(along, 0.0), near) + (stray + steered) * near;
+            let slack = larger(sign * (d - reach) - 2.0 * coarse_band, 0.0) * near;
+            // Of a product near the ends of what f32 can hold, too little is left to say anything.
+            let slack = if (slack > TINIEST) & (slack < HUGEST) { slack } else { 0.0 };
+            // sqrt(b^2 + 4cw) <= b + 2 sqrt(cw), which can not get lost.
+            let bending = if unfolds { 0.0 } else { 0.5 * any * (2.0 * slack).sqrt() };
+            let radial = frames(slack, rate(smaller(towards + bending, (any + steered) * near)));
+
+            let outside = (r - d - 2.0 * margin) * per_any;
+            let both = larger(sideways, radial);
+            let either = larger(outside, smaller(sideways, radial));
+            // What is not a number says nothing.
+            let least = larger(if unfolds { both } else { either }, 0.0);
+            earliest[i] = if unfolds { smaller(earliest[i], least) } else { larger(earliest[i], least) };
         }
     }
-    std::array::from_fn(|i| {
-        let frames = if block.tag[i] == 0 { unfolds[i] } else { folds[i] };
-        // It may be the division that has overflown, not the time that is infinite.
-        if frames == f32::INFINITY { f32::MAX } else { frames }
-    })
+    // It may be the division that has overflown, not the time that is infinite.
+    earliest.map(|frames| smaller(frames, f32::MAX))
 }
 
 /// A rate, and more than its computation and a division by it can have lost, also to underflow.
@@ -265,7 +305,9 @@ mod tests {
             k in prop_oneof![Just(1.0), 1.0..2000.0, Just(1e30), Just(1e300)],
             scale in prop_oneof![Just(1.0), Just(1e-25), Just(1e-15), Just(1e4), Just(1e25)],
             sphere_size in any::<bool>(),
+            heading in prop::array::uniform3(-1.0..1.0_f64),
             rho in prop_oneof![Just(0.0), Just(1e-50), 0.01..10.0],
+            stray in prop_oneof![Just(0.0), Just(1e-50), 0.001..10.0],
             omega in prop_oneof![Just(0.0), 1e-6..0.1],
             kappa in prop_oneof![Just(0.0), 0.1..10.0],
             seeds in prop::array::uniform16((any::<u32>(), any::<u32>(), any::<u32>(), any::<u32>())),
@@ -274,7 +316,8 @@ mod tests {
             let eye = DVec3::from(eye) * scale;
             let direction = DVec3::from(aim).normalize_or(DVec3::X);
             let view = View { eye, direction, cos_beta: beta.cos(), sin_beta: beta.sin(), k };
-            let speed = Speed { rho, omega, kappa };
+            let heading = DVec3::from(heading).normalize_or_zero();
+            let course = Course { heading, rho, stray, omega, kappa };
             let mut block = Block::EMPTY;
             let mut all = Vec::new();
             for (lane, &(s0, s1, s2, s3)) in seeds.iter().enumerate() {
@@ -309,11 +352,11 @@ mod tests {
                 // that a node that should change need not.
                 for fold in [false, true] {
                     block.tag[lane] = u32::from(fold);
-                    let filtered = f64::from(earliest(&block, lenses.as_slice(), &speed)[lane]);
+                    let filtered = f64::from(earliest(&block, lenses.as_slice(), &Rates::new(&course))[lane]);
                     let exact = if fold {
-                        criterion.earliest_fold(&[view], &speed, bounds)
+                        criterion.earliest_fold(&[view], &course, bounds)
                     } else {
-                        criterion.earliest_unfold(&[view], &speed, bounds)
+                        criterion.earliest_unfold(&[view], &course, bounds)
                     };
                     prop_assert!(filtered <= exact, "{bounds:?}, fold {fold}: {filtered} > {exact}");
                 }

@@ -1,12 +1,38 @@
 //! The active front: which nodes are unfolded, and the compact record that is kept of each node in play.
 //!
 //! A node is *in play* while its first structural parent is active (or it is a root): active nodes and boundary nodes,
-//! and where nodes have several parents, also those that wait for another of them. For these the front keeps sphere and error, and the links that a top-down traversal follows, in records that
-//! come and go with them. The records of two siblings share a cache line, and all of them lie together however sparse
-//! the nodes in play are among all nodes: what a frame reads fits the caches if the front does, not the hierarchy.
+//! and where nodes have several parents, also those that wait for another of them. For these the front keeps sphere and
+//! error, and the links that a top-down traversal follows, in records that come and go with them. The records of two
+//! siblings share a cache line, and all of them lie together however sparse the nodes in play are among all nodes: what a
+//! frame reads fits the caches if the front does, not the hierarchy.
+//!
+//! A node in play is known by the [`Slot`] of its record. The engine, the strategies and the event queue index their own
+//! arrays by it too, so all of them are as large as the front.
 
 use slab::Slab;
-use vertex_tree::{Bounds, NONE, NodeId, VertexTree};
+use vertex_tree::{Bounds, NONE, NodeId, VertexTree, prefetch};
+
+/// Where the record of a node in play is. Used again when the node has gone out of play.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
+#[repr(transparent)]
+pub struct Slot(pub u32);
+
+impl Slot {
+    /// Stands for no node.
+    pub const NONE: Self = Self(0);
+
+    /// The slot as an array index.
+    #[inline(always)]
+    #[must_use]
+    pub fn index(self) -> usize {
+        self.0 as usize
+    }
+
+    #[inline(always)]
+    fn pair(self) -> usize {
+        self.0 as usize / 2
+    }
+}
 
 /// A node's record: half a cache line.
 #[derive(Clone, Copy)]
@@ -24,11 +50,12 @@ pub(crate) struct Record {
 }
 
 impl Record {
+    /// Where there is no node: neither a boundary node nor collapsible.
     const BLANK: Self = Self {
         bounds: Bounds { center: [0.0; 3], radius: 0.0, eps: 0.0 },
         node: NodeId(NONE),
         children: 0,
-        status: 0,
+        status: 1,
     };
 
     #[inline(always)]
@@ -58,76 +85,85 @@ const COUNT: u32 = MANY - 1;
 
 /// The nodes in play.
 pub struct Front {
-    /// For each node in play, where its record is: twice its pair, plus 1 if it is the second. Pair 0 belongs to no
-    /// node and stands for those that are not in play.
-    slots: Vec<u32>,
+    /// Pair 0 has no nodes: its slots stand for those that are not in play.
     pairs: Vec<Pair>,
+    /// For each pair, the slot of the parent that it is linked below; [`Slot::NONE`] for roots.
+    above: Vec<Slot>,
     /// Pairs to use again, last in, first out.
     free: Vec<u32>,
     /// Pairs of the children of nodes that have more than two, as they do in a multi-triangulation.
     many: Slab<Vec<u32>>,
+    /// The pairs of the roots, and where each root is, in order of nodes.
     roots: Vec<u32>,
+    root_slots: Vec<(NodeId, Slot)>,
+    /// For each node in play, its slot. Kept only for graphs: in a tree, what is linked says it all.
+    slots: Vec<Slot>,
     active: usize,
     hash: u64,
 }
 
 impl Front {
-    pub(crate) fn new(node_limit: u32) -> Self {
-        Self {
-            slots: vec![0; node_limit as usize],
-            // Nodes that are not in play are no boundary nodes.
-            pairs: vec![Pair([Record { status: 1, ..Record::BLANK }; 2])],
+    /// With the roots in play.
+    pub(crate) fn new<T: VertexTree>(tree: &T) -> Self {
+        let mut front = Self {
+            pairs: vec![Pair([Record::BLANK; 2])],
+            above: vec![Slot::NONE],
             free: Vec::new(),
             many: Slab::new(),
             roots: Vec::new(),
+            root_slots: Vec::new(),
+            slots: if T::IS_TREE { Vec::new() } else { vec![Slot::NONE; tree.node_limit() as usize] },
             active: 0,
             hash: 0,
+        };
+        let roots: Vec<_> = tree.roots().iter().map(|&root| (root, tree.bounds(root))).collect();
+        for two in roots.chunks(2) {
+            let pair = front.add_pair(Slot::NONE, [Some(two[0]), two.get(1).copied()]);
+            front.roots.push(pair);
+            let slots = (2 * pair..).map(Slot);
+            front.root_slots.extend(two.iter().zip(slots).map(|(&(root, _), slot)| (root, slot)));
         }
+        front.root_slots.sort_unstable();
+        front
     }
 
     #[inline(always)]
-    fn record(&self, node: NodeId) -> &Record {
-        let slot = self.slots[node.index()] as usize;
-        &self.pairs[slot / 2].0[slot % 2]
+    pub(crate) fn record(&self, slot: Slot) -> &Record {
+        &self.pairs[slot.pair()].0[slot.index() % 2]
     }
 
     #[inline(always)]
-    fn record_mut(&mut self, node: NodeId) -> &mut Record {
-        let slot = self.slots[node.index()] as usize;
-        &mut self.pairs[slot / 2].0[slot % 2]
+    fn record_mut(&mut self, slot: Slot) -> &mut Record {
+        &mut self.pairs[slot.pair()].0[slot.index() % 2]
     }
 
-    /// Whether the node is unfolded.
-    #[inline]
-    #[must_use]
-    pub fn is_active(&self, node: NodeId) -> bool {
-        self.record(node).is_active()
+    /// The node whose record a slot holds.
+    #[inline(always)]
+    pub(crate) fn node(&self, slot: Slot) -> NodeId {
+        self.record(slot).node
     }
 
-    /// Whether the node is unfolded and can be folded next: all its structural children are folded.
-    #[inline]
-    #[must_use]
-    pub fn is_collapsible(&self, node: NodeId) -> bool {
-        self.record(node).is_collapsible()
+    /// Sphere and error of the node in a slot.
+    #[inline(always)]
+    pub(crate) fn bounds(&self, slot: Slot) -> Bounds {
+        self.record(slot).bounds
     }
 
-    /// Whether the node is folded and can be unfolded next: all its structural parents are active.
-    #[inline]
-    #[must_use]
-    pub fn is_boundary(&self, node: NodeId) -> bool {
-        self.record(node).is_boundary()
+    /// Starts to read a record into the cache, and the place that says what is above.
+    #[inline(always)]
+    pub(crate) fn prefetch(&self, slot: Slot) {
+        prefetch(&self.pairs, slot.pair());
+        prefetch(&self.above, slot.pair());
     }
 
-    /// Reads what changing these nodes will read, for all of them at once: see [`VertexTree::prepare`].
-    pub(crate) fn prepare(&self, nodes: &[NodeId]) {
-        std::hint::black_box(nodes.iter().fold(0, |sum, &node| sum ^ self.record(node).status));
-    }
-
-    /// Sphere and error of a node in play.
-    #[inline]
-    #[must_use]
-    pub fn bounds(&self, node: NodeId) -> Bounds {
-        self.record(node).bounds
+    /// Starts to read the records of what is above a node and below it.
+    #[inline(always)]
+    pub(crate) fn prefetch_linked(&self, slot: Slot) {
+        prefetch(&self.pairs, self.above[slot.pair()].pair());
+        let record = self.record(slot);
+        if record.status & MANY == 0 {
+            prefetch(&self.pairs, record.children as usize);
+        }
     }
 
     /// How many nodes are unfolded.
@@ -153,54 +189,117 @@ impl Front {
         &self.pairs[pair as usize].0
     }
 
-    /// Appends the pairs of the nodes linked below a node to `below`.
+    /// The pairs of the nodes linked below a node.
     #[inline(always)]
-    pub(crate) fn descend(&self, record: &Record, below: &mut Vec<u32>) {
+    pub(crate) fn below<'a>(&'a self, record: &'a Record) -> &'a [u32] {
         if record.children == 0 {
+            &[]
         } else if record.status & MANY == 0 {
-            below.push(record.children);
+            std::slice::from_ref(&record.children)
         } else {
-            below.extend_from_slice(&self.many[record.children as usize - 1]);
+            &self.many[record.children as usize - 1]
         }
     }
 
-    /// Makes records for two nodes, or one.
-    fn add_pair(&mut self, nodes: [Option<(NodeId, Bounds)>; 2]) -> u32 {
-        let pair = self.free.pop().unwrap_or_else(|| {
-            self.pairs.push(Pair([Record::BLANK; 2]));
-            self.pairs.len() as u32 - 1
-        });
-        for (side, node) in nodes.into_iter().enumerate() {
-            let record =
-                node.map_or(Record::BLANK, |(node, bounds)| Record { bounds, node, ..Record::BLANK });
-            self.pairs[pair as usize].0[side] = record;
-            if let Some((node, _)) = node {
-                self.slots[node.index()] = 2 * pair + side as u32;
+    /// The nodes in play in some pairs.
+    fn slots_in<'a>(&'a self, pairs: &'a [u32]) -> impl Iterator<Item = Slot> + 'a {
+        let slots = pairs.iter().flat_map(|&pair| [Slot(2 * pair), Slot(2 * pair + 1)]);
+        slots.filter(|&slot| self.node(slot).0 != NONE)
+    }
+
+    /// The roots.
+    pub(crate) fn roots(&self) -> impl Iterator<Item = Slot> + '_ {
+        self.slots_in(&self.roots)
+    }
+
+    /// Where the structural children of an active node are, those in play.
+    #[inline(always)]
+    pub(crate) fn children<'a, T: VertexTree>(
+        &'a self,
+        tree: &'a T,
+        slot: Slot,
+    ) -> impl Iterator<Item = Slot> + 'a {
+        let linked = if T::IS_TREE { self.below(self.record(slot)) } else { &[] };
+        let others = (!T::IS_TREE).then(|| tree.children(self.node(slot)));
+        let others = others.into_iter().flatten().map(|child| self.slots[child.index()]);
+        self.slots_in(linked).chain(others.filter(|&slot| slot != Slot::NONE))
+    }
+
+    /// Where the structural parents of a node in play are, those in play.
+    #[inline(always)]
+    pub(crate) fn parents<'a, T: VertexTree>(
+        &'a self,
+        tree: &'a T,
+        slot: Slot,
+    ) -> impl Iterator<Item = Slot> + 'a {
+        let linked = T::IS_TREE.then(|| self.above[slot.pair()]);
+        let others = (!T::IS_TREE).then(|| tree.parents(self.node(slot)));
+        let others = others.into_iter().flatten().map(|parent| self.slots[parent.index()]);
+        linked.into_iter().chain(others).filter(|&slot| slot != Slot::NONE)
+    }
+
+    /// Where a node is; [`Slot::NONE`] if it is not in play. In a tree this follows the links from the node's root down.
+    pub(crate) fn find<T: VertexTree>(&self, tree: &T, node: NodeId) -> Slot {
+        if !T::IS_TREE {
+            return self.slots[node.index()];
+        }
+        let parent = |node: &NodeId| tree.parents(*node).next();
+        let mut path: Vec<NodeId> = std::iter::successors(Some(node), parent).collect();
+        let root =
+            path.pop().and_then(|root| self.root_slots.binary_search_by_key(&root, |&(node, _)| node).ok());
+        let Some(root) = root else { return Slot::NONE };
+        let start = Some(self.root_slots[root].1);
+        let down = |slot: Option<Slot>, &node: &NodeId| {
+            self.slots_in(self.below(self.record(slot?))).find(|&slot| self.node(slot) == node)
+        };
+        path.iter().rev().fold(start, down).unwrap_or(Slot::NONE)
+    }
+
+    /// Makes records for two nodes, or one, linked below the node in slot `above`.
+    #[inline(always)]
+    fn add_pair(&mut self, above: Slot, nodes: [Option<(NodeId, Bounds)>; 2]) -> u32 {
+        let record = |node: Option<(NodeId, Bounds)>| match node {
+            Some((node, bounds)) => Record { bounds, node, children: 0, status: 0 },
+            None => Record::BLANK,
+        };
+        let two = Pair(nodes.map(record));
+        let pair = match self.free.pop() {
+            Some(pair) => {
+                self.pairs[pair as usize] = two;
+                self.above[pair as usize] = above;
+                pair
+            }
+            None => {
+                self.pairs.push(two);
+                self.above.push(above);
+                self.pairs.len() as u32 - 1
+            }
+        };
+        if !self.slots.is_empty() {
+            for (slot, (node, _)) in (2 * pair..).zip(nodes.into_iter().flatten()) {
+                self.slots[node.index()] = Slot(slot);
             }
         }
         pair
     }
 
+    #[inline(always)]
     fn remove_pair(&mut self, pair: u32) {
-        for record in self.pairs[pair as usize].0 {
-            if record.node.0 != NONE {
-                self.slots[record.node.index()] = 0;
+        if !self.slots.is_empty() {
+            for record in self.pairs[pair as usize].0 {
+                if record.node.0 != NONE {
+                    self.slots[record.node.index()] = Slot::NONE;
+                }
             }
         }
         self.pairs[pair as usize] = Pair([Record::BLANK; 2]);
         self.free.push(pair);
     }
 
-    /// Roots come into play.
-    pub(crate) fn add_roots(&mut self, roots: &[(NodeId, Bounds)]) {
-        for two in roots.chunks(2) {
-            let pair = self.add_pair([Some(two[0]), two.get(1).copied()]);
-            self.roots.push(pair);
-        }
-    }
-
-    /// Records that `node` has been unfolded, and that its children come into play.
-    pub(crate) fn set_active<T: VertexTree>(&mut self, tree: &T, node: NodeId) {
+    /// Records that a boundary node has been unfolded, and that its children come into play.
+    #[inline(always)]
+    pub(crate) fn set_active<T: VertexTree>(&mut self, tree: &T, slot: Slot) {
+        let node = self.node(slot);
         // Each child is linked below its first parent alone: a spanning tree, where the structure is a graph.
         let mut linked = tree
             .children_and_bounds(node)
@@ -208,13 +307,13 @@ impl Front {
         let mut status = ACTIVE;
         let mut children = match linked.next() {
             None => 0,
-            Some(first) => self.add_pair([Some(first), linked.next()]),
+            Some(first) => self.add_pair(slot, [Some(first), linked.next()]),
         };
         if let Some(mut next) = linked.next() {
             let mut pairs = vec![children];
             loop {
                 let after = linked.next();
-                pairs.push(self.add_pair([Some(next), after]));
+                pairs.push(self.add_pair(slot, [Some(next), after]));
                 let Some(following) = after.and_then(|_| linked.next()) else { break };
                 next = following;
             }
@@ -224,28 +323,29 @@ impl Front {
         drop(linked);
         if !T::IS_TREE {
             for child in tree.children(node) {
+                let child_slot = self.slots[child.index()];
                 if tree.parents(child).next() == Some(node) {
-                    let waits_for = |p: &NodeId| *p != node && !self.is_active(*p);
-                    self.record_mut(child).status = tree.parents(child).filter(waits_for).count() as u32;
-                } else if self.slots[child.index()] != 0 {
-                    self.record_mut(child).status -= 1;
+                    let waits_for =
+                        |p: &NodeId| *p != node && !self.record(self.slots[p.index()]).is_active();
+                    self.record_mut(child_slot).status = tree.parents(child).filter(waits_for).count() as u32;
+                } else if child_slot != Slot::NONE {
+                    self.record_mut(child_slot).status -= 1;
                 }
             }
         }
-        let record = self.record_mut(node);
+        let record = self.record_mut(slot);
         record.status = status;
         record.children = children;
-        for parent in tree.parents(node) {
-            self.record_mut(parent).status += 1;
-        }
+        self.count_at_parents(tree, slot, 1);
         self.active += 1;
         self.hash = self.hash.wrapping_add(mix(tree.log_number(node)));
     }
 
-    /// Records that `node` has been folded.
-    pub(crate) fn set_folded<T: VertexTree>(&mut self, tree: &T, node: NodeId) {
-        let record = self.record_mut(node);
-        let (status, children) = (record.status, record.children);
+    /// Records that a collapsible node has been folded.
+    #[inline(always)]
+    pub(crate) fn set_folded<T: VertexTree>(&mut self, tree: &T, slot: Slot) {
+        let record = self.record_mut(slot);
+        let (node, status, children) = (record.node, record.status, record.children);
         record.status = 0;
         record.children = 0;
         if status & MANY != 0 {
@@ -258,16 +358,32 @@ impl Front {
         if !T::IS_TREE {
             // What is still in play is linked below another parent, and waits for this one again.
             for child in tree.children(node) {
-                if self.slots[child.index()] != 0 {
+                let child = self.slots[child.index()];
+                if child != Slot::NONE {
                     self.record_mut(child).status += 1;
                 }
             }
         }
-        for parent in tree.parents(node) {
-            self.record_mut(parent).status -= 1;
-        }
+        self.count_at_parents(tree, slot, -1);
         self.active -= 1;
         self.hash = self.hash.wrapping_sub(mix(tree.log_number(node)));
+    }
+
+    /// An active child more, or one less.
+    #[inline(always)]
+    fn count_at_parents<T: VertexTree>(&mut self, tree: &T, slot: Slot, change: i32) {
+        if T::IS_TREE {
+            let above = self.above[slot.pair()];
+            if above != Slot::NONE {
+                let record = self.record_mut(above);
+                record.status = record.status.wrapping_add_signed(change);
+            }
+        } else {
+            for parent in tree.parents(self.node(slot)) {
+                let record = self.record_mut(self.slots[parent.index()]);
+                record.status = record.status.wrapping_add_signed(change);
+            }
+        }
     }
 
     /// Calls `f` with every active node, parents before the children linked below them.
@@ -277,7 +393,7 @@ impl Front {
             for record in self.pair(pair) {
                 if record.is_active() {
                     f(record.node);
-                    self.descend(record, &mut stack);
+                    stack.extend_from_slice(self.below(record));
                 }
             }
         }

@@ -1,5 +1,7 @@
 //! How fast the camera may move, and the clock that runs on distance travelled.
 
+use glam::DVec3;
+
 use crate::view::View;
 
 /// Declared bounds on the camera's motion in one frame. They decide how far ahead events are scheduled, never
@@ -14,12 +16,53 @@ pub struct Speed {
     pub kappa: f64,
 }
 
-impl Speed {
+/// How the camera may move in one frame of a clock: the eye forward along a heading by up to `rho` and besides in any
+/// direction by up to `stray`; the direction turns by up to `omega`, and `k` changes by up to `kappa`.
+///
+/// With a heading, the clock knows that what is ahead comes nearer and what is behind or beside does not, or not as
+/// fast: see [`Criterion::earliest_unfold`](crate::criterion::Criterion::earliest_unfold). Like [`Speed`], a course
+/// decides how far ahead events are scheduled, never whether the cut is right: a camera that strays from it makes the
+/// clock run faster.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Course {
+    /// Unit vector, or zero where there is no heading.
+    pub heading: DVec3,
+    /// Distance along the heading, in object units.
+    pub rho: f64,
+    /// Distance in any direction, in object units.
+    pub stray: f64,
+    /// See [`Speed::omega`].
+    pub omega: f64,
+    /// See [`Speed::kappa`].
+    pub kappa: f64,
+}
+
+impl From<Speed> for Course {
+    /// In any direction by up to `rho`.
+    fn from(Speed { rho, omega, kappa }: Speed) -> Self {
+        Self { heading: DVec3::ZERO, rho: 0.0, stray: rho, omega, kappa }
+    }
+}
+
+impl Course {
     /// Frames until `distance` has been covered at `rate` a frame: 0 if there is nothing left to cover, infinite
     /// if nothing moves.
     #[inline(always)]
     pub(crate) fn frames(&self, distance: f64, rate: f64) -> f64 {
         if distance > 0.0 { distance / rate } else { 0.0 }
+    }
+
+    /// The fewest frames that allow for the eye to move by `moved`: forward by no more than `rho` a frame, the rest of it
+    /// by no more than `stray`.
+    fn frames_to_move(&self, moved: DVec3) -> f64 {
+        let forward = moved.dot(self.heading);
+        let frames = |amount: f64, rate: f64| if amount > 0.0 { amount / rate } else { 0.0 };
+        if forward > 0.0 && self.rho > 0.0 {
+            let astray = (moved - forward * self.heading).length();
+            frames(forward, self.rho).max(frames(astray, self.stray))
+        } else {
+            frames(moved.length(), self.stray)
+        }
     }
 }
 
@@ -54,16 +97,16 @@ impl Odometer {
     }
 
     /// Advances by the motion from the views of the last frame to those of this one.
-    pub fn advance(&mut self, speed: &Speed, before: &[View], after: &[View]) -> Motion {
+    pub fn advance(&mut self, course: &Course, before: &[View], after: &[View]) -> Motion {
         match Travel::between(before, after) {
-            Some(travel) => self.advance_by(speed, &travel),
+            Some(travel) => self.advance_by(course, &travel),
             None => Motion::Unbounded,
         }
     }
 
     /// Advances by a motion.
-    pub(crate) fn advance_by(&mut self, speed: &Speed, travel: &Travel) -> Motion {
-        let motion = travel.on_clock(speed);
+    pub(crate) fn advance_by(&mut self, course: &Course, travel: &Travel) -> Motion {
+        let motion = travel.on_course(course);
         if let Motion::Frames(frames) = motion {
             // Millions of small steps must not be rounded away either.
             self.now = (self.now + frames).next_up();
@@ -72,38 +115,42 @@ impl Odometer {
     }
 }
 
-/// How far the views have moved from one frame to the next: the most that any of them has in each way.
+/// How far the views have moved from one frame to the next.
 #[derive(Clone, Copy, Debug)]
-pub(crate) struct Travel {
-    moved: f64,
-    turned: f64,
-    steered: f64,
+pub(crate) struct Travel<'a> {
+    before: &'a [View],
+    after: &'a [View],
+    /// The most that any of them has turned, and that the `k` of any has changed.
+    pub turned: f64,
+    pub steered: f64,
     is_rest: bool,
 }
 
-impl Travel {
+impl<'a> Travel<'a> {
     /// `None` if the views can not be compared.
-    pub fn between(before: &[View], after: &[View]) -> Option<Self> {
+    pub fn between(before: &'a [View], after: &'a [View]) -> Option<Self> {
         if before.len() != after.len() || !before.iter().zip(after).all(|(b, a)| b.same_cone(a)) {
             return None;
         }
-        let mut travel = Self { moved: 0.0, turned: 0.0, steered: 0.0, is_rest: before == after };
+        let mut travel = Self { before, after, turned: 0.0, steered: 0.0, is_rest: before == after };
         for (b, a) in before.iter().zip(after) {
             // acos of a dot product is 0 for slow pans, and the clock would stand still.
             let turned =
                 2.0 * (a.direction - b.direction).length().atan2((a.direction + b.direction).length());
-            travel.moved = travel.moved.max(a.eye.distance(b.eye));
             travel.turned = travel.turned.max(turned);
             travel.steered = travel.steered.max((a.k - b.k).abs());
         }
         Some(travel)
     }
 
-    fn on_clock(&self, speed: &Speed) -> Motion {
-        let mut frames = 0.0_f64;
-        for (amount, rate) in
-            [(self.moved, speed.rho), (self.turned, speed.omega), (self.steered, speed.kappa)]
-        {
+    /// How each eye has moved.
+    pub fn moves(&self) -> impl Iterator<Item = DVec3> + '_ {
+        self.before.iter().zip(self.after).map(|(b, a)| a.eye - b.eye)
+    }
+
+    fn on_course(&self, course: &Course) -> Motion {
+        let mut frames = self.moves().map(|moved| course.frames_to_move(moved)).fold(0.0, f64::max);
+        for (amount, rate) in [(self.turned, course.omega), (self.steered, course.kappa)] {
             if amount > 0.0 {
                 frames = frames.max(amount / rate);
             }

@@ -12,21 +12,29 @@
 //!   event comes up to an eighth of its time early, is tested for nothing, and is scheduled again.
 //! * There can be several clocks, each with a wheel of its own; an event waits on one of them (see
 //!   [`refine::event`](crate::refine::event) for what they measure).
-//! * Cancelling an event touches one byte. Each node has a *ticket*, each event the ticket of its node when it was
-//!   scheduled; cancelling changes the node's, and events with an old ticket are dropped when they come up.
+//! * Cancelling an event touches two bytes. Each node in play has a *ticket*, each event the ticket of its node when it
+//!   was scheduled; cancelling changes the node's, and events with an old ticket are dropped when they come up.
+//!
+//! Nodes are known by the slots of their records in the [`Front`](crate::front::Front), so tickets are as many as there
+//! are nodes in play and stay in a near cache.
 //!
 //! Events of the tick that a clock is in come up at every advance until that tick has passed: their deadline may
 //! lie anywhere in it.
 
-use vertex_tree::{Bounds, NONE, NodeId};
+use vertex_tree::{Bounds, prefetch};
+
+use crate::front::Slot;
 
 /// Ticks in a frame at full speed. A camera far below full speed still has ticks that are finer than its frames.
 pub const TICKS_PER_FRAME: f64 = 512.0;
 
 /// Slots a level. Deadlines go to the level on which they are at least half of this away.
 const SLOTS: u64 = 16;
-/// Level 44 reaches 2^47 ticks ahead. Whatever is further waits in its last slot, and is scheduled again.
-const LEVELS: usize = 44;
+/// Level 28 reaches 2^32 ticks ahead, which is further than any deadline: those are `u32` ticks ahead, and what is
+/// further is scheduled again.
+const LEVELS: usize = 29;
+/// The furthest that an event is scheduled ahead, in ticks: 4 million frames at full speed.
+pub const HORIZON: u32 = 1 << 31;
 
 /// Which status change an event waits for.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -45,7 +53,7 @@ pub struct Event {
     /// Sphere and error of the node.
     pub bounds: Bounds,
     /// The node to test.
-    pub node: NodeId,
+    pub slot: Slot,
     /// Twice the ticket, plus 1 where it waits for folding. No member is narrower than its neighbours, or copying an
     /// event would be several moves.
     tag: u32,
@@ -53,6 +61,14 @@ pub struct Event {
 }
 
 impl Event {
+    /// Stands where there is no event.
+    pub const BLANK: Self = Self {
+        bounds: Bounds { center: [0.0; 3], radius: 0.0, eps: 0.0 },
+        slot: Slot::NONE,
+        tag: 0,
+        _reserved: 0,
+    };
+
     /// What the test is for.
     #[inline(always)]
     #[must_use]
@@ -61,84 +77,118 @@ impl Event {
     }
 
     #[inline(always)]
-    fn ticket(&self) -> u8 {
-        (self.tag >> 1) as u8
+    pub(crate) fn tag(&self) -> u32 {
+        self.tag
+    }
+
+    #[inline(always)]
+    fn ticket(&self) -> u16 {
+        (self.tag >> 1) as u16
     }
 }
 
 /// Events in a chunk.
-const CHUNK: usize = 15;
+const CHUNK: u32 = 16;
 
-/// Part of a bucket: 512 bytes.
-#[derive(Clone, Copy, Debug)]
-#[repr(C)]
-struct Chunk {
-    events: [Event; CHUNK],
-    len: u32,
-    /// The next chunk of the bucket, or of the free ones; [`NONE`] after the last.
-    next: u32,
-}
+/// A list of chunks of events, of which all but the newest are full: the place after its last event, counted through
+/// all chunks of the pool; 0 while it is empty.
+///
+/// To append is one store where the event goes and one here, in an array that is small enough to stay near. A count in
+/// the chunk itself would be a read that misses the cache, for every event.
+type Bucket = u32;
 
 /// Where all buckets keep their events. Chunks are used again last in, first out: what is written next was read just
 /// before and is in the nearest cache, and once there are enough of them nothing is allocated any more.
 #[derive(Debug)]
 struct Pool {
-    chunks: Vec<Chunk>,
-    free: u32,
+    /// The first one is not used, as place 0 says that a bucket is empty.
+    chunks: Vec<[Event; CHUNK as usize]>,
+    /// For each chunk, the one before it in its bucket, or 0.
+    previous: Vec<u32>,
+    free: Vec<u32>,
 }
 
 impl Pool {
-    /// Appends an event to the bucket whose newest chunk is `bucket`.
-    #[inline(always)]
-    fn push(&mut self, bucket: &mut u32, event: Event) {
-        if let Some(chunk) = self.chunks.get_mut(*bucket as usize)
-            && let Some(place) = chunk.events.get_mut(chunk.len as usize)
-        {
-            *place = event;
-            chunk.len += 1;
-        } else {
-            self.push_chunk(bucket, event);
-        }
+    fn new() -> Self {
+        Self { chunks: vec![[Event::BLANK; CHUNK as usize]], previous: vec![0], free: Vec::new() }
     }
 
-    fn push_chunk(&mut self, bucket: &mut u32, event: Event) {
-        let new = self.free;
-        if let Some(chunk) = self.chunks.get_mut(new as usize) {
-            self.free = std::mem::replace(&mut chunk.next, *bucket);
-            chunk.events[0] = event;
-            chunk.len = 1;
-            *bucket = new;
-        } else {
-            self.chunks.push(Chunk { events: [event; CHUNK], len: 1, next: *bucket });
-            *bucket = self.chunks.len() as u32 - 1;
+    #[inline(always)]
+    fn push(&mut self, bucket: &mut Bucket, event: Event) {
+        if bucket.is_multiple_of(CHUNK) {
+            self.open(bucket);
         }
+        let (chunk, place) = ((*bucket / CHUNK) as usize, (*bucket % CHUNK) as usize);
+        self.chunks[chunk][place] = event;
+        *bucket += 1;
+        // Where the bucket's next event but one goes: stores leave the processor in order, and one that misses the
+        // nearest cache holds up all others.
+        prefetch(self.chunks.as_flattened(), *bucket as usize + 1);
     }
 
-    /// Moves the events of a bucket for which `keep` says so to `due`, and empties it. Returns how many there were.
+    /// Adds an empty chunk to a bucket.
+    #[inline(never)]
+    fn open(&mut self, bucket: &mut Bucket) {
+        let previous = bucket.saturating_sub(1) / CHUNK;
+        let chunk = self.free.pop().unwrap_or_else(|| {
+            self.chunks.push([Event::BLANK; CHUNK as usize]);
+            self.previous.push(0);
+            self.chunks.len() as u32 - 1
+        });
+        if let Some(&next) = self.free.last() {
+            prefetch(&self.chunks, next as usize);
+        }
+        self.previous[chunk as usize] = previous;
+        *bucket = chunk * CHUNK;
+    }
+
+    /// Takes events off the end of a bucket that is not empty, no more than there is room for in `due` after the first
+    /// `count`, and none but those that `keep` says to keep. Returns how many there are in `due` then, and how many
+    /// were taken off.
     #[inline(always)]
-    fn take(&mut self, bucket: &mut u32, due: &mut Vec<Event>, keep: impl Fn(&Event) -> bool) -> usize {
-        let mut count = 0;
-        while let Some(chunk) = self.chunks.get_mut(*bucket as usize) {
-            let events = &chunk.events[..chunk.len as usize];
-            count += events.len();
-            due.reserve(events.len());
-            for event in events {
-                if keep(event) {
-                    due.push(*event);
-                }
+    fn take(
+        &mut self,
+        bucket: &mut Bucket,
+        due: &mut [Event; DUE],
+        mut count: usize,
+        keep: impl Fn(&Event) -> bool,
+    ) -> (usize, usize) {
+        let chunk = (*bucket - 1) / CHUNK;
+        let start = chunk * CHUNK;
+        let used = (*bucket - start) as usize;
+        let taken = used.min(DUE - count);
+        for event in &self.chunks[chunk as usize][used - taken..used] {
+            due[count % DUE] = *event;
+            count += usize::from(keep(event));
+        }
+        *bucket -= taken as u32;
+        if *bucket == start {
+            self.free.push(chunk);
+            let previous = self.previous[chunk as usize];
+            *bucket = if previous == 0 { 0 } else { (previous + 1) * CHUNK };
+            if previous != 0 {
+                self.prefetch_chunk(previous);
             }
-            let next = std::mem::replace(&mut chunk.next, self.free);
-            self.free = std::mem::replace(bucket, next);
         }
-        count
+        (count, taken)
+    }
+
+    #[inline(always)]
+    fn prefetch_chunk(&self, chunk: u32) {
+        for event in (0..CHUNK).step_by(2) {
+            prefetch(self.chunks.as_flattened(), (chunk * CHUNK + event) as usize);
+        }
     }
 }
+
+/// Most events that come up at a time: as many as vector code tests together.
+pub const DUE: usize = crate::packed::LANES;
 
 /// Buckets of events on one clock.
 #[derive(Debug)]
 struct Wheel {
-    /// `levels[l][s]` is the newest chunk of the events whose deadline tick, divided by `2^l`, is `s` modulo 16.
-    levels: [[u32; SLOTS as usize]; LEVELS],
+    /// `levels[l][s]` has the events whose deadline tick, divided by `2^l`, is `s` modulo 16.
+    levels: [[Bucket; SLOTS as usize]; LEVELS],
     /// For each level, a bit for each slot that may hold events.
     occupied: [u16; LEVELS],
     /// The tick that the clock is in.
@@ -147,29 +197,27 @@ struct Wheel {
 
 impl Wheel {
     fn new() -> Self {
-        Self { levels: [[NONE; SLOTS as usize]; LEVELS], occupied: [0; LEVELS], tick: 0 }
+        Self { levels: [[0; SLOTS as usize]; LEVELS], occupied: [0; LEVELS], tick: 0 }
     }
 
+    /// Puts an event where it comes up before the clock is more than `ahead` ticks further.
     #[inline(always)]
-    fn push(&mut self, pool: &mut Pool, now: f64, frames: f64, event: Event) {
-        // Rounded down; `as` saturates, so that a bound of infinity is as late as can be.
-        let deadline = ((now + frames).next_down() * TICKS_PER_FRAME) as u64;
-        let ahead = deadline.saturating_sub(self.tick);
+    fn push(&mut self, pool: &mut Pool, ahead: u32, event: Event) {
+        let ahead = ahead.min(HORIZON);
+        let deadline = self.tick + u64::from(ahead);
         // On level l, `ahead` spans (ahead >> l) slots, and one more where it straddles their borders: at most 15.
-        let level = (64 - ahead.leading_zeros() as usize).saturating_sub(4);
-        let (mut level, deadline) = if level < LEVELS {
-            (level, self.tick + ahead)
-        } else {
-            (LEVELS - 1, self.tick + ((SLOTS - 2) << (LEVELS - 1)))
-        };
-        level += usize::from((deadline >> level) - (self.tick >> level) >= SLOTS);
-        let slot = ((deadline >> level) % SLOTS) as usize;
+        let level = (32 - ahead.leading_zeros()).saturating_sub(4);
+        let straddles = (deadline >> level) - (self.tick >> level) >= SLOTS;
+        let level = level + u32::from(straddles);
+        let slot = (deadline >> level) as u32 % SLOTS as u32;
+        // Never more than there are, which spares a panic.
+        let level = level as usize % LEVELS;
         self.occupied[level] |= 1 << slot;
-        pool.push(&mut self.levels[level][slot], event);
+        pool.push(&mut self.levels[level][slot as usize], event);
     }
 
-    /// Calls `take` with each bucket that the clock reaches on its way to `now`.
-    fn advance(&mut self, now: f64, take: &mut dyn FnMut(&mut u32)) {
+    /// Moves each bucket that the clock reaches on its way to `now` to `ripe`.
+    fn advance(&mut self, now: f64, ripe: &mut Vec<Bucket>) {
         let before = self.tick;
         let after = (now * TICKS_PER_FRAME) as u64;
         debug_assert!(after >= before, "the clock went back from tick {before} to {after}");
@@ -182,33 +230,68 @@ impl Wheel {
                 // Wider levels have not moved either.
                 break;
             }
-            if self.occupied[level] == 0 {
-                continue;
-            }
-            for slot in first..=last.min(first + SLOTS - 1) {
-                self.take(level, (slot % SLOTS) as usize, take);
-            }
+            // The slots from `first` to `last`, round the ring.
+            let count = (last - first + 1).min(SLOTS);
+            let reached = (((1_u32 << count) - 1) as u16).rotate_left((first % SLOTS) as u32);
+            self.take(level, reached, ripe);
         }
     }
 
-    fn take(&mut self, level: usize, slot: usize, take: &mut dyn FnMut(&mut u32)) {
-        if self.occupied[level] >> slot & 1 == 1 {
-            self.occupied[level] &= !(1 << slot);
-            take(&mut self.levels[level][slot]);
+    fn take_all(&mut self, ripe: &mut Vec<Bucket>) {
+        for level in 0..LEVELS {
+            self.take(level, u16::MAX, ripe);
+        }
+    }
+
+    /// Moves the buckets in some slots of a level, one bit each.
+    fn take(&mut self, level: usize, slots: u16, ripe: &mut Vec<Bucket>) {
+        let mut slots = slots & self.occupied[level];
+        self.occupied[level] &= !slots;
+        while slots != 0 {
+            let bucket = std::mem::take(&mut self.levels[level][slots.trailing_zeros() as usize]);
+            // Nothing may be left in it but its bit.
+            if bucket != 0 {
+                ripe.push(bucket);
+            }
+            slots &= slots - 1;
         }
     }
 }
 
-/// The queue. Times are frames at full speed on an [`Odometer`](crate::motion::Odometer), one for each clock.
+/// One clock of a queue.
+pub(crate) struct OnClock<'a> {
+    wheel: &'a mut Wheel,
+    pool: &'a mut Pool,
+    stored: &'a mut usize,
+}
+
+impl OnClock<'_> {
+    #[inline(always)]
+    pub fn schedule(&mut self, frames: f64, event: Event) {
+        // Rounded down, as the clock's time is to its tick; `as` saturates.
+        self.schedule_ticks((frames * TICKS_PER_FRAME) as u32, event);
+    }
+
+    /// Schedules an event that must not come up more than so many ticks after the one that the clock is in.
+    #[inline(always)]
+    pub fn schedule_ticks(&mut self, ticks: u32, event: Event) {
+        *self.stored += 1;
+        self.wheel.push(self.pool, ticks, event);
+    }
+}
+
+/// The queue. Times are frames on an [`Odometer`](crate::motion::Odometer), one for each clock.
 #[derive(Debug)]
 pub struct EventQueue {
     wheels: Vec<Wheel>,
     pool: Pool,
     /// Events to return at every advance.
-    pressing: u32,
+    pressing: Bucket,
+    /// Buckets whose time has come, none of them empty.
+    ripe: Vec<Bucket>,
     /// Kept between sweeps for its allocation.
     swept: Vec<Event>,
-    tickets: Vec<u8>,
+    tickets: Vec<u16>,
     /// Events in the buckets, cancelled ones included.
     stored: usize,
     /// An upper bound on the cancelled ones among them.
@@ -216,15 +299,16 @@ pub struct EventQueue {
 }
 
 impl EventQueue {
-    /// An empty queue for nodes with numbers less than `node_limit`, all its clocks at time 0.
+    /// An empty queue, all its clocks at time 0.
     #[must_use]
-    pub fn new(node_limit: u32, clocks: usize) -> Self {
+    pub fn new(clocks: usize) -> Self {
         Self {
             wheels: (0..clocks).map(|_| Wheel::new()).collect(),
-            pool: Pool { chunks: Vec::new(), free: NONE },
-            pressing: NONE,
+            pool: Pool::new(),
+            pressing: 0,
+            ripe: Vec::new(),
             swept: Vec::new(),
-            tickets: vec![0; node_limit as usize],
+            tickets: Vec::new(),
             stored: 0,
             cancelled: 0,
         }
@@ -242,28 +326,35 @@ impl EventQueue {
         self.stored == 0
     }
 
-    /// An event for `node`, to be scheduled; void once something cancels it.
+    /// An event for a node, to be scheduled; void once something cancels it.
     #[inline]
     #[must_use]
-    pub fn event(&self, node: NodeId, kind: Kind, bounds: Bounds) -> Event {
-        let tag = u32::from(self.tickets[node.index()]) << 1 | u32::from(kind == Kind::Fold);
-        Event { bounds, node, tag, _reserved: 0 }
+    pub fn event(&mut self, slot: Slot, kind: Kind, bounds: Bounds) -> Event {
+        if self.tickets.len() <= slot.index() {
+            self.tickets.resize(slot.index() + 1, 0);
+        }
+        let tag = u32::from(self.tickets[slot.index()]) << 1 | u32::from(kind == Kind::Fold);
+        Event { bounds, slot, tag, _reserved: 0 }
     }
 
     /// Whether nothing has cancelled an event since it was made.
     #[inline]
     #[must_use]
     pub fn is_valid(&self, event: &Event) -> bool {
-        self.tickets[event.node.index()] == event.ticket()
+        self.tickets[event.slot.index()] == event.ticket()
     }
 
-    /// Schedules an event that must not come up later than `frames` after the clock's present time `now`, which is
-    /// that of the last [`advance`](Self::advance). Does not touch the node, so that an event that has come up and led
-    /// to nothing can be scheduled again in passing.
+    /// Schedules an event that must not come up later than `frames` after the clock's time at the last
+    /// [`advance`](Self::advance). Does not touch the node, so that an event that has come up and led to nothing can be
+    /// scheduled again in passing.
+    pub fn schedule(&mut self, clock: usize, frames: f64, event: Event) {
+        self.on(clock).schedule(frames, event);
+    }
+
+    /// For scheduling many events on one clock.
     #[inline(always)]
-    pub fn schedule(&mut self, clock: usize, now: f64, frames: f64, event: Event) {
-        self.stored += 1;
-        self.wheels[clock].push(&mut self.pool, now, frames, event);
+    pub(crate) fn on(&mut self, clock: usize) -> OnClock<'_> {
+        OnClock { wheel: &mut self.wheels[clock], pool: &mut self.pool, stored: &mut self.stored }
     }
 
     /// Schedules an event for the next advance of any clock and every advance after it, moved or not, until it is
@@ -273,10 +364,10 @@ impl EventQueue {
         self.pool.push(&mut self.pressing, event);
     }
 
-    /// Cancels whatever is scheduled for `node`.
+    /// Cancels whatever is scheduled for a node.
     #[inline]
-    pub fn cancel(&mut self, node: NodeId) {
-        let ticket = &mut self.tickets[node.index()];
+    pub fn cancel(&mut self, slot: Slot) {
+        let Some(ticket) = self.tickets.get_mut(slot.index()) else { return };
         *ticket = ticket.wrapping_add(1);
         let wrapped = *ticket == 0;
         self.cancelled += 1;
@@ -289,60 +380,83 @@ impl EventQueue {
 
     #[cold]
     fn sweep(&mut self) {
-        let Self { wheels, pool, pressing, swept, tickets, .. } = self;
+        let Self { wheels, pool, pressing, ripe, swept, tickets, .. } = self;
         self.stored = 0;
         let buckets = wheels.iter_mut().flat_map(|wheel| wheel.levels.as_flattened_mut());
-        for bucket in buckets.chain([pressing]) {
+        let mut due = [Event::BLANK; DUE];
+        for bucket in buckets.chain(ripe).chain([pressing]) {
             swept.clear();
-            pool.take(bucket, swept, |event| tickets[event.node.index()] == event.ticket());
+            while *bucket != 0 {
+                let is_valid = |event: &Event| tickets[event.slot.index()] == event.ticket();
+                let (count, _) = pool.take(bucket, &mut due, 0, is_valid);
+                swept.extend_from_slice(&due[..count]);
+            }
             swept.iter().for_each(|&event| pool.push(bucket, event));
             self.stored += swept.len();
         }
+        self.ripe.retain(|&bucket| bucket != 0);
         self.cancelled = 0;
     }
 
-    /// Appends the pressing events to `due`, removing them.
-    pub fn take_pressing(&mut self, due: &mut Vec<Event>) {
-        let mut pressing = std::mem::replace(&mut self.pressing, NONE);
-        self.with_wheels(due, |_, take| take(&mut pressing));
+    /// Reads the tickets of nodes into the cache that are about to be cancelled or given events.
+    pub(crate) fn prefetch(&self, slot: Slot) {
+        prefetch(&self.tickets, slot.index());
     }
 
-    /// Moves a clock to `now` and appends to `due` every event on it that must be tested by then, removing it, and
-    /// whatever is pressing.
-    pub fn advance(&mut self, clock: usize, now: f64, due: &mut Vec<Event>) {
-        self.take_pressing(due);
-        self.with_wheels(due, |wheels, take| wheels[clock].advance(now, take));
+    /// Lets the pressing events come up.
+    pub fn take_pressing(&mut self) {
+        let pressing = std::mem::take(&mut self.pressing);
+        if pressing != 0 {
+            self.ripe.push(pressing);
+        }
     }
 
-    /// Appends every event on one clock to `due`, removing it: for a motion that its speeds do not cover.
-    pub fn take_clock(&mut self, clock: usize, due: &mut Vec<Event>) {
-        self.with_wheels(due, |wheels, take| {
-            for level in 0..LEVELS {
-                for slot in 0..SLOTS as usize {
-                    wheels[clock].take(level, slot, take);
+    /// Moves a clock to `now`, and lets every event on it come up that must be tested by then, and whatever is pressing.
+    pub fn advance(&mut self, clock: usize, now: f64) {
+        self.take_pressing();
+        self.wheels[clock].advance(now, &mut self.ripe);
+    }
+
+    /// Whether no event waits on a clock.
+    #[must_use]
+    pub fn is_idle(&self, clock: usize) -> bool {
+        self.wheels[clock].occupied == [0; LEVELS]
+    }
+
+    /// Lets every event on one clock come up: for a motion that its speeds do not cover.
+    pub fn take_clock(&mut self, clock: usize) {
+        self.wheels[clock].take_all(&mut self.ripe);
+    }
+
+    /// Lets every event come up: for a motion that no declared speed covers.
+    pub fn take_all(&mut self) {
+        self.take_pressing();
+        for clock in 0..self.wheels.len() {
+            self.take_clock(clock);
+        }
+    }
+
+    /// Removes some of the events that have come up and returns how many; 0 when there are no more. They are the first
+    /// ones in `due`. Those that are scheduled meanwhile do not come up before their clock advances again.
+    #[inline(always)]
+    pub fn next_due(&mut self, due: &mut [Event; DUE]) -> usize {
+        let Self { ripe, pool, tickets, stored, cancelled, .. } = self;
+        let mut count = 0;
+        while count < DUE
+            && let Some(bucket) = ripe.last_mut()
+        {
+            let is_valid = |event: &Event| tickets[event.slot.index()] == event.ticket();
+            let (now, taken) = pool.take(bucket, due, count, is_valid);
+            *stored -= taken;
+            *cancelled = cancelled.saturating_sub(taken - (now - count));
+            count = now;
+            if *bucket == 0 {
+                ripe.pop();
+                if let Some(&next) = ripe.last() {
+                    pool.prefetch_chunk((next - 1) / CHUNK);
                 }
             }
-        });
-    }
-
-    /// Appends every event to `due`, removing it: for a motion that no declared speed covers.
-    pub fn take_all(&mut self, due: &mut Vec<Event>) {
-        self.take_pressing(due);
-        for clock in 0..self.wheels.len() {
-            self.take_clock(clock, due);
         }
-        self.cancelled = 0;
-    }
-
-    /// Calls `f` with the wheels and with what moves the valid events of a bucket to `due`.
-    #[inline(always)]
-    fn with_wheels(&mut self, due: &mut Vec<Event>, f: impl FnOnce(&mut [Wheel], &mut dyn FnMut(&mut u32))) {
-        let Self { wheels, pool, tickets, stored, cancelled, .. } = self;
-        f(wheels, &mut |bucket| {
-            let before = due.len();
-            let taken = pool.take(bucket, due, |event| tickets[event.node.index()] == event.ticket());
-            *stored -= taken;
-            *cancelled = cancelled.saturating_sub(taken - (due.len() - before));
-        });
+        count
     }
 }

@@ -6,10 +6,10 @@ pub mod front;
 pub mod published;
 pub mod top_down;
 
-use vertex_tree::{Bounds, NodeId};
+use vertex_tree::Bounds;
 
 use crate::criterion::Criterion;
-use crate::front::Front;
+use crate::front::{Front, Slot};
 use crate::motion::{Motion, Speed};
 use crate::queue::Kind;
 use crate::view::View;
@@ -68,8 +68,8 @@ impl Frame<'_> {
 /// Nodes whose status must flip: boundary nodes to unfold, collapsible nodes to fold.
 #[derive(Default)]
 pub(crate) struct Flips {
-    pub unfold: Vec<NodeId>,
-    pub fold: Vec<NodeId>,
+    pub unfold: Vec<Slot>,
+    pub fold: Vec<Slot>,
     /// Tests of the criterion made to find them.
     pub tests: u64,
 }
@@ -79,17 +79,17 @@ pub(crate) struct Flips {
 pub(crate) enum Finder {
     TopDown(top_down::TopDown),
     Front(front::FrontScan),
-    Event(event::EventDriven),
+    Event(Box<event::EventDriven>),
     Published(published::Published),
 }
 
 impl Finder {
-    pub fn new(strategy: Strategy, node_limit: u32) -> Self {
+    pub fn new(strategy: Strategy) -> Self {
         match strategy {
             Strategy::TopDown => Self::TopDown(top_down::TopDown::default()),
-            Strategy::Front => Self::Front(front::FrontScan::new(node_limit)),
-            Strategy::Event => Self::Event(event::EventDriven::new(node_limit)),
-            Strategy::EventPublished => Self::Published(published::Published::new(node_limit)),
+            Strategy::Front => Self::Front(front::FrontScan::default()),
+            Strategy::Event => Self::Event(Box::new(event::EventDriven::new())),
+            Strategy::EventPublished => Self::Published(published::Published::default()),
         }
     }
 
@@ -103,14 +103,14 @@ impl Finder {
         }
     }
 
-    /// `node` has become a boundary node or collapsible; the criterion does not ask for it to change.
+    /// The node has become a boundary node or collapsible; the criterion does not ask for it to change.
     #[inline]
-    pub fn watch(&mut self, frame: &Frame, node: NodeId, kind: Kind, bounds: Bounds) {
+    pub fn watch(&mut self, frame: &Frame, slot: Slot, kind: Kind, bounds: Bounds) {
         match self {
             Self::TopDown(_) => {}
-            Self::Front(s) => s.watch(node, kind, bounds),
-            Self::Event(s) => s.watch(node, kind, bounds),
-            Self::Published(s) => s.watch(frame, node, kind, &bounds),
+            Self::Front(s) => s.watch(slot, kind, bounds),
+            Self::Event(s) => s.watch(slot, kind, bounds),
+            Self::Published(s) => s.watch(frame, slot, kind, &bounds),
         }
     }
 
@@ -121,25 +121,33 @@ impl Finder {
         }
     }
 
-    /// `node` is no longer what it was watched as, if it was watched.
+    /// The node is no longer what it was watched as, if it was watched.
     #[inline]
-    pub fn unwatch(&mut self, node: NodeId) {
+    pub fn unwatch(&mut self, slot: Slot) {
         match self {
             Self::TopDown(_) => {}
-            Self::Front(s) => s.unwatch(node),
-            Self::Event(s) => s.unwatch(node),
-            Self::Published(s) => s.unwatch(node),
+            Self::Front(s) => s.unwatch(slot),
+            Self::Event(s) => s.unwatch(slot),
+            Self::Published(s) => s.unwatch(slot),
         }
     }
 
-    /// `node` should have changed, but the backend refused for now: it must be found again in the next frame, even
+    /// Starts to read into the cache what [`unwatch`](Self::unwatch) and [`watch`](Self::watch) will touch.
+    #[inline]
+    pub fn prefetch(&self, slot: Slot) {
+        if let Self::Event(s) = self {
+            s.prefetch(slot);
+        }
+    }
+
+    /// The node should have changed, but the backend refused for now: it must be found again in the next frame, even
     /// if nothing moves.
-    pub fn refused(&mut self, frame: &Frame, node: NodeId, kind: Kind, bounds: Bounds) {
+    pub fn refused(&mut self, slot: Slot, kind: Kind, bounds: Bounds) {
         match self {
             Self::TopDown(_) => {}
-            Self::Front(s) => s.watch(node, kind, bounds),
-            Self::Event(s) => s.refused(node, kind, bounds),
-            Self::Published(s) => s.refused(frame, node, kind),
+            Self::Front(s) => s.watch(slot, kind, bounds),
+            Self::Event(s) => s.refused(slot, kind, bounds),
+            Self::Published(s) => s.refused(slot, kind),
         }
     }
 }

@@ -3,22 +3,41 @@
 use std::collections::BTreeMap;
 use std::collections::btree_map::Entry;
 
+use foldfront::Bounds;
 use foldfront::criterion::Criterion;
-use foldfront::motion::{Motion, Odometer, Speed};
-use foldfront::queue::{EventQueue, Kind, TICKS_PER_FRAME};
+use foldfront::front::Slot;
+use foldfront::motion::{Course, Motion, Odometer};
+use foldfront::queue::{DUE, Event, EventQueue, HORIZON, Kind, TICKS_PER_FRAME};
 use foldfront::view::View;
-use foldfront::{Bounds, NodeId};
 use glam::DVec3;
 use proptest::prelude::*;
 
 #[derive(Clone, Debug)]
 enum Operation {
-    Schedule { node: u32, clock: usize, frames: f64 },
-    Press { node: u32 },
-    Cancel { node: u32 },
-    Advance { clock: usize, frames: f64 },
+    Schedule {
+        node: u32,
+        clock: usize,
+        frames: f64,
+    },
+    Press {
+        node: u32,
+    },
+    Cancel {
+        node: u32,
+    },
+    /// So often that what is cancelled is swept out.
+    CancelOften {
+        node: u32,
+        times: u32,
+    },
+    Advance {
+        clock: usize,
+        frames: f64,
+    },
     Rest,
-    TakeClock { clock: usize },
+    TakeClock {
+        clock: usize,
+    },
     TakeAll,
 }
 
@@ -30,7 +49,8 @@ fn operation() -> impl Strategy<Value = Operation> {
         6 => (node.clone(), 0..CLOCKS, frames)
             .prop_map(|(node, clock, frames)| Operation::Schedule { node, clock, frames }),
         1 => node.clone().prop_map(|node| Operation::Press { node }),
-        2 => node.prop_map(|node| Operation::Cancel { node }),
+        2 => node.clone().prop_map(|node| Operation::Cancel { node }),
+        1 => (node, 1000..3000_u32).prop_map(|(node, times)| Operation::CancelOften { node, times }),
         6 => (0..CLOCKS, motion).prop_map(|(clock, frames)| Operation::Advance { clock, frames }),
         1 => Just(Operation::Rest),
         1 => (0..CLOCKS).prop_map(|clock| Operation::TakeClock { clock }),
@@ -45,6 +65,17 @@ const CLOCKS: usize = 2;
 
 const BOUNDS: Bounds = Bounds { center: [0.0; 3], radius: 1.0, eps: 0.0 };
 
+/// Every event that has come up.
+fn all_due(queue: &mut EventQueue) -> Vec<Event> {
+    let (mut all, mut due) = (Vec::new(), [Event::BLANK; DUE]);
+    loop {
+        match queue.next_due(&mut due) {
+            0 => return all,
+            count => all.extend_from_slice(&due[..count]),
+        }
+    }
+}
+
 proptest! {
     #![proptest_config(ProptestConfig::with_cases(2000))]
 
@@ -52,45 +83,52 @@ proptest! {
     /// whose deadline lies in the tick that their clock is in come up at every advance.
     #[test]
     fn queue_agrees_with_an_ordered_map(operations in prop::collection::vec(operation(), 1..200)) {
-        let mut queue = EventQueue::new(40, CLOCKS);
+        let mut queue = EventQueue::new(CLOCKS);
         let mut model = Model::new();
         let mut now = [0.0; CLOCKS];
         for operation in operations {
-            let mut due = Vec::new();
             match operation {
                 Operation::Schedule { node, clock, frames } => {
                     if let Entry::Vacant(entry) = model.entry(node) {
-                        let event = queue.event(NodeId(node), Kind::Unfold, BOUNDS);
-                        queue.schedule(clock, now[clock], frames, event);
+                        let event = queue.event(Slot(node), Kind::Unfold, BOUNDS);
+                        queue.schedule(clock, frames, event);
                         entry.insert(Some((clock, now[clock], now[clock] + frames)));
                     }
                     continue;
                 }
                 Operation::Press { node } => {
                     if let Entry::Vacant(entry) = model.entry(node) {
-                        queue.press(queue.event(NodeId(node), Kind::Unfold, BOUNDS));
+                        let event = queue.event(Slot(node), Kind::Unfold, BOUNDS);
+                        queue.press(event);
                         entry.insert(None);
                     }
                     continue;
                 }
+                Operation::CancelOften { node, times } => {
+                    model.remove(&node);
+                    (0..times).for_each(|_| queue.cancel(Slot(node)));
+                    continue;
+                }
                 Operation::Cancel { node } => {
                     model.remove(&node);
-                    queue.cancel(NodeId(node));
+                    queue.cancel(Slot(node));
                     continue;
                 }
                 Operation::Advance { clock, frames } => {
                     now[clock] += frames;
                     let now = now[clock];
-                    queue.advance(clock, now, &mut due);
+                    queue.advance(clock, now);
+                    let due = all_due(&mut queue);
                     for event in &due {
-                        let scheduled = model.remove(&event.node.0);
-                        prop_assert!(scheduled.is_some(), "node {} came up unscheduled", event.node.0);
+                        let scheduled = model.remove(&event.slot.0);
+                        prop_assert!(scheduled.is_some(), "node {} came up unscheduled", event.slot.0);
                         if let Some(Some((its_clock, since, deadline))) = scheduled {
                             prop_assert_eq!(its_clock, clock);
                             // A slot is at most a quarter as wide as the time it was ahead; the horizon is finite.
-                            let early = deadline - now;
+                            let horizon = f64::from(HORIZON) / TICKS_PER_FRAME;
+                            let early = deadline.min(since + horizon) - now;
                             prop_assert!(
-                                early <= (deadline - since) / 4.0 + 1.0 / TICKS_PER_FRAME || deadline > 1e12,
+                                early <= (deadline - since) / 4.0 + 1.0 / TICKS_PER_FRAME,
                                 "scheduled at {since} for {deadline}, came up at {now}"
                             );
                         }
@@ -101,33 +139,36 @@ proptest! {
                     }
                 }
                 Operation::Rest => {
-                    queue.take_pressing(&mut due);
+                    queue.take_pressing();
+                    let due = all_due(&mut queue);
                     for event in &due {
-                        prop_assert_eq!(model.remove(&event.node.0), Some(None));
+                        prop_assert_eq!(model.remove(&event.slot.0), Some(None));
                     }
                     prop_assert!(model.values().all(Option::is_some), "a pressing event did not come up");
                 }
                 Operation::TakeClock { clock } => {
-                    queue.take_clock(clock, &mut due);
+                    queue.take_clock(clock);
+                    let due = all_due(&mut queue);
                     for event in &due {
-                        let scheduled = model.remove(&event.node.0).flatten();
+                        let scheduled = model.remove(&event.slot.0).flatten();
                         prop_assert!(scheduled.is_some_and(|(its_clock, ..)| its_clock == clock));
                     }
                     prop_assert!(!model.values().flatten().any(|&(its_clock, ..)| its_clock == clock));
                 }
                 Operation::TakeAll => {
-                    queue.take_all(&mut due);
+                    queue.take_all();
+                    let due = all_due(&mut queue);
                     for event in &due {
-                        prop_assert!(model.remove(&event.node.0).is_some());
+                        prop_assert!(model.remove(&event.slot.0).is_some());
                     }
                     prop_assert!(model.is_empty());
                 }
             }
         }
         // At the end of time, or at a motion without bounds, everything that is left comes up.
-        let mut due = Vec::new();
-        queue.take_all(&mut due);
-        let mut left: Vec<u32> = due.iter().map(|e| e.node.0).collect();
+        queue.take_all();
+        let due = all_due(&mut queue);
+        let mut left: Vec<u32> = due.iter().map(|e| e.slot.0).collect();
         left.sort_unstable();
         prop_assert_eq!(left, model.into_keys().collect::<Vec<_>>());
         prop_assert!(queue.is_empty());
@@ -141,15 +182,18 @@ proptest! {
         eps in prop_oneof![Just(0.0_f32), 0.0..0.01_f32, 0.0..0.5_f32],
         sphere_size in any::<bool>(),
         seed in any::<u64>(),
-        (rho, omega, kappa) in (
+        heading in prop::array::uniform3(-1.0..1.0_f64),
+        (rho, stray, omega, kappa) in (
             prop_oneof![Just(0.0), 0.001..0.5],
+            prop_oneof![Just(0.0), 0.0001..0.5],
             prop_oneof![Just(0.0), 0.0001..0.1],
             prop_oneof![Just(0.0), 0.01..5.0],
         ),
     ) {
         let bounds = Bounds { center, radius, eps };
         let criterion = if sphere_size { Criterion::SphereSize } else { Criterion::ScreenError };
-        let speed = Speed { rho, omega, kappa };
+        let heading = DVec3::from(heading).normalize_or_zero();
+        let course = Course { heading, rho, stray, omega, kappa };
         let mut random = Random(seed);
         let mut views = vec![random.view(), random.view()];
         if random.unit() < 0.5 {
@@ -160,16 +204,16 @@ proptest! {
         let mut deadline = 0.0;
         for _ in 0..300 {
             let bound = if active {
-                criterion.earliest_fold(&views, &speed, &bounds)
+                criterion.earliest_fold(&views, &course, &bounds)
             } else {
-                criterion.earliest_unfold(&views, &speed, &bounds)
+                criterion.earliest_unfold(&views, &course, &bounds)
             };
             deadline = f64::max(deadline, clock.now() + bound);
             let before = views.clone();
             for view in &mut views {
-                random.step(view, &speed, center);
+                random.step(view, &course, center);
             }
-            match clock.advance(&speed, &before, &views) {
+            match clock.advance(&course, &before, &views) {
                 Motion::Rest => prop_assert_eq!(criterion.unfold(&views, &bounds), active),
                 Motion::Unbounded => deadline = 0.0,
                 Motion::Frames(_) => {}
@@ -214,17 +258,17 @@ impl Random {
     }
 
     /// Moves a view by up to full speed in each way at once, as often as not straight at or away from the centre.
-    fn step(&mut self, view: &mut View, speed: &Speed, center: [f32; 3]) {
+    fn step(&mut self, view: &mut View, course: &Course, center: [f32; 3]) {
         let to_center = (DVec3::from(center.map(f64::from)) - view.eye).normalize_or(DVec3::X);
         let sign = if self.unit() < 0.5 { 1.0 } else { -1.0 };
         let way = if self.unit() < 0.6 { to_center * sign } else { self.direction() };
-        view.eye += way * speed.rho * self.unit();
+        view.eye += course.heading * course.rho * self.unit() + way * course.stray * self.unit();
         let aim = if self.unit() < 0.6 { to_center * sign } else { self.direction() };
         let axis = view.direction.cross(aim);
         if axis.length() > 1e-9 {
-            let turn = glam::DQuat::from_axis_angle(axis.normalize(), speed.omega * self.unit());
+            let turn = glam::DQuat::from_axis_angle(axis.normalize(), course.omega * self.unit());
             view.direction = (turn * view.direction).normalize();
         }
-        view.k = (view.k + speed.kappa * (self.unit() - 0.5) * 2.0).max(1.0);
+        view.k = (view.k + course.kappa * (self.unit() - 0.5) * 2.0).max(1.0);
     }
 }

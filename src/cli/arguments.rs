@@ -6,6 +6,7 @@ use std::time::Duration;
 
 use clap::{Args, Parser, Subcommand, ValueEnum};
 
+use crate::budget::WorkCap;
 use crate::criterion::Criterion;
 use crate::path::import;
 use crate::refine::Strategy;
@@ -145,6 +146,9 @@ pub(super) struct Compare {
     /// Steer the tolerance so that a refinement step takes no longer, such as 5ms.
     #[arg(long, value_name = "TIME", value_parser = duration, conflicts_with_all = ["theta", "pixels"])]
     pub frame_time: Option<Duration>,
+    /// Do no more in a frame than N folds and unfolds, or than fit a time such as 200us; the rest is carried over.
+    #[arg(long, value_name = "N", value_parser = work_cap)]
+    pub work_cap: Option<WorkCap>,
     /// Full speed of the eye in object units a frame; by default the path's 99th percentile.
     #[arg(long, value_parser = positive)]
     pub rho: Option<f64>,
@@ -337,6 +341,15 @@ fn duration(text: &str) -> Result<Duration, String> {
     }
 }
 
+/// A number of changes, or a time.
+fn work_cap(text: &str) -> Result<WorkCap, String> {
+    let expected = |_| "a number of changes, or a time such as 200us, is expected".to_owned();
+    match text.parse() {
+        Ok(changes) => Ok(WorkCap::Changes(changes)),
+        Err(_) => duration(text).map(WorkCap::Time).map_err(expected),
+    }
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -361,6 +374,9 @@ mod tests {
         assert_eq!(duration("5ms"), Ok(Duration::from_millis(5)));
         assert_eq!(duration("0.5s"), Ok(Duration::from_millis(500)));
         assert!(duration("5").is_err());
+        assert_eq!(work_cap("100"), Ok(WorkCap::Changes(100)));
+        assert_eq!(work_cap("200us"), Ok(WorkCap::Time(Duration::from_micros(200))));
+        assert!(work_cap("-1").is_err());
         assert!(positive("NaN").is_err());
         assert_eq!(strategy("event"), Ok(Strategy::Event));
         assert!(strategy("best").is_err());

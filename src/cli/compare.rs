@@ -155,6 +155,7 @@ fn options(command: &Compare) -> Options {
         criterion: command.refinement.criterion.into(),
         theta: command.refinement.theta(),
         budget,
+        work_cap: command.work_cap.unwrap_or_default(),
         rho: command.rho,
         omega: command.omega,
         check: command.check,

@@ -179,7 +179,7 @@ pub fn write_frames(file: &Path, runs: &[&Run]) -> Result<(), WriteError> {
                     r.folds.to_string(),
                     r.forced.to_string(),
                     r.blocked.to_string(),
-                    "0".to_owned(),
+                    r.carried.to_string(),
                     r.misses.to_string(),
                     row.wrong.map_or_else(String::new, |w| w.to_string()),
                     r.limit.name().to_owned(),

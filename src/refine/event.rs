@@ -5,101 +5,160 @@
 //!
 //! # Several clocks
 //!
-//! A clock advances by the larger of distance travelled over `rho` and angle turned over `omega`, so it is wasteful
-//! for a camera that turns without moving as fast as declared, or moves without turning. Here several clocks differ in
-//! the ratio of the two: clock `i` takes one of the declared speeds down by a power of two. All of them always run; an
-//! event waits on the one that fit the motion of the frame in which it was scheduled. Each by itself never misses, so
-//! the choice is free.
+//! A clock advances by the largest of what the camera does in terms of what the clock allows it to do in a frame (its
+//! [`Course`]). It is wasteful for a camera that does only one of these things, or does them another way. So the course
+//! follows the motion: it has the heading and the speeds of the last few frames, and room to stray. When the camera has
+//! left it, a new clock starts on a new course, and events that are scheduled from then on wait on that one. Those that
+//! wait on older clocks stay there until they come up: all clocks go on running. Each by itself never misses, so the
+//! choice is free.
 
+use glam::DVec3;
 use multiversion::multiversion;
-use vertex_tree::{Bounds, NodeId};
+use vertex_tree::Bounds;
 
 use super::{Flips, Frame};
-use crate::filter::{Lens, Lenses, earliest};
-use crate::motion::{Motion, Odometer, Speed, Travel};
+use crate::filter::{Lens, Lenses, Rates, earliest};
+use crate::front::Slot;
+use crate::motion::{Course, Motion, Odometer, Speed, Travel};
 use crate::packed::{Block, LANES};
-use crate::queue::{Event, EventQueue, Kind};
+use crate::queue::{Event, EventQueue, HORIZON, Kind, OnClock, TICKS_PER_FRAME};
 use crate::view::View;
 
-/// Clocks with `omega` taken down, and as many with `rho` taken down.
-const SKEWED: i32 = 4;
-const CLOCKS: usize = 2 * SKEWED as usize + 1;
+/// Clocks that run at the same time. When a new course needs one, the oldest gives up its events: they are tested early.
+const CLOCKS: usize = 16;
+
+/// Frames that a course is kept at least, so that a camera that shakes does not wear out the clocks.
+const LEAST_FRAMES: u32 = 6;
+
+/// How much more than another course one may cost before it is left.
+const PATIENCE: f64 = 1.15;
+
+/// Weight of a new frame in the means of recent motion.
+const NEWS: f64 = 0.25;
+
+/// Room to stray: this share of the speed along the heading, and so many times as far as the camera has strayed.
+const STRAY: f64 = 1.0 / 8.0;
+const STRAYED: f64 = 1.5;
+
+/// No speed of a course is less than this share of the declared one at the pace of the motion.
+const LEAST: f64 = 1.0 / 16.0;
 
 pub(crate) struct EventDriven {
     queue: EventQueue,
-    odometers: [Odometer; CLOCKS],
-    /// The clock for new events.
+    clocks: [Clock; CLOCKS],
+    /// The clock for new events, and for how many frames it has been.
     clock: usize,
+    frames: u32,
+    /// Recent motion of the first view, newer frames counting more, and how far it has strayed from its mean.
+    drift: DVec3,
+    strayed: f64,
     /// Nodes watched since the last frame's events were scheduled.
     fresh: Vec<Event>,
-    /// Kept between frames for its allocation.
-    due: Vec<Event>,
 }
 
-/// Declared speeds of a clock.
-fn skew(speed: &Speed, clock: usize) -> Speed {
-    let skew = clock as i32 - SKEWED;
-    let share = f64::from(1_u32 << skew.unsigned_abs()).recip();
-    if skew < 0 {
-        Speed { omega: speed.omega * share, ..*speed }
-    } else {
-        Speed { rho: speed.rho * share, ..*speed }
-    }
+#[derive(Clone, Copy)]
+struct Clock {
+    course: Course,
+    odometer: Odometer,
 }
 
 impl EventDriven {
-    pub fn new(node_limit: u32) -> Self {
+    pub fn new() -> Self {
+        let course = Course::from(Speed { rho: 1.0, omega: 1.0, kappa: 1.0 });
         Self {
-            queue: EventQueue::new(node_limit, CLOCKS),
-            odometers: [Odometer::default(); CLOCKS],
-            clock: SKEWED as usize,
+            queue: EventQueue::new(CLOCKS),
+            clocks: [Clock { course, odometer: Odometer::default() }; CLOCKS],
+            clock: 0,
+            // The first motion sets the first course.
+            frames: LEAST_FRAMES,
+            drift: DVec3::ZERO,
+            strayed: 0.0,
             fresh: Vec::new(),
-            due: Vec::new(),
         }
     }
 
     pub fn find(&mut self, frame: &Frame, before: &[View], flips: &mut Flips) {
         // Nodes may have come to be watched outside of a frame: the roots.
         self.settle(frame);
-        self.due.clear();
         match frame.motion {
-            Motion::Rest => self.queue.take_pressing(&mut self.due),
+            Motion::Rest => self.queue.take_pressing(),
             Motion::Frames(_) => self.advance(frame, before),
-            Motion::Unbounded => self.queue.take_all(&mut self.due),
+            Motion::Unbounded => self.queue.take_all(),
         }
-        if self.due.is_empty() {
-            return;
-        }
-        flips.tests += self.due.len() as u64;
-        let due = std::mem::take(&mut self.due);
-        self.process(&due, frame, |event, _| match event.kind() {
-            Kind::Unfold => flips.unfold.push(event.node),
-            Kind::Fold => flips.fold.push(event.node),
+        let Flips { unfold, fold, tests } = flips;
+        let next = |queue: &mut EventQueue, due: &mut [Event; LANES]| {
+            let count = queue.next_due(due);
+            *tests += count as u64;
+            count
+        };
+        self.process(frame, next, |event, _| match event.kind() {
+            Kind::Unfold => unfold.push(event.slot),
+            Kind::Fold => fold.push(event.slot),
         });
-        self.due = due;
     }
 
-    /// Moves all clocks, and chooses the one that the motion fits.
+    /// Moves all clocks, and sees to it that the current one is on the camera's course.
     fn advance(&mut self, frame: &Frame, before: &[View]) {
         let Some(travel) = Travel::between(before, frame.views) else {
-            return self.queue.take_all(&mut self.due);
+            return self.queue.take_all();
         };
-        let mut least = f64::INFINITY;
-        for clock in 0..CLOCKS {
-            let speed = skew(&frame.speed, clock);
-            match self.odometers[clock].advance_by(&speed, &travel) {
-                Motion::Frames(frames) => {
-                    self.queue.advance(clock, self.odometers[clock].now(), &mut self.due);
-                    // What the clock allows for in the time that it takes this motion for, at a typical distance.
-                    let share = speed.rho / frame.speed.rho + speed.omega / frame.speed.omega;
-                    if frames * share < least {
-                        least = frames * share;
-                        self.clock = clock;
-                    }
+        let mut taken = Motion::Rest;
+        for (number, clock) in self.clocks.iter_mut().enumerate() {
+            if number == self.clock || !self.queue.is_idle(number) {
+                let motion = clock.odometer.advance_by(&clock.course, &travel);
+                match motion {
+                    Motion::Frames(_) => self.queue.advance(number, clock.odometer.now()),
+                    Motion::Rest => {}
+                    Motion::Unbounded => self.queue.take_clock(number),
                 }
-                Motion::Rest => {}
-                Motion::Unbounded => self.queue.take_clock(clock, &mut self.due),
+                if number == self.clock {
+                    taken = motion;
+                }
             }
+        }
+        self.follow(frame, &travel, taken);
+    }
+
+    /// Starts a clock on a new course if the current one costs too much for the motion: it took so many frames for it.
+    fn follow(&mut self, frame: &Frame, travel: &Travel, taken: Motion) {
+        let course = self.course(&frame.speed, travel);
+        self.frames += 1;
+        let is_left = match taken {
+            Motion::Rest => false,
+            Motion::Frames(frames) => {
+                self.frames > LEAST_FRAMES
+                    && frames * cost(&self.clocks[self.clock].course, &frame.speed)
+                        > PATIENCE * cost(&course, &frame.speed)
+            }
+            Motion::Unbounded => true,
+        };
+        if is_left {
+            self.clock = (self.clock + 1) % CLOCKS;
+            self.queue.take_clock(self.clock);
+            self.clocks[self.clock].course = course;
+            self.frames = 0;
+        }
+    }
+
+    /// The course on which a motion takes one frame.
+    fn course(&mut self, speed: &Speed, travel: &Travel) -> Course {
+        let moved = travel.moves().next().unwrap_or_default();
+        self.drift += (moved - self.drift) * NEWS;
+        let heading = self.drift.normalize_or_zero();
+        let forward = moved.dot(heading).max(0.0);
+        self.strayed += ((moved - forward * heading).length() - self.strayed) * NEWS;
+
+        let farthest = travel.moves().map(DVec3::length).fold(0.0, f64::max);
+        let per = |amount: f64, rate: f64| if rate > 0.0 { amount / rate } else { 0.0 };
+        let pace = per(farthest, speed.rho).max(per(travel.turned, speed.omega));
+        let pace = LEAST * pace.max(per(travel.steered, speed.kappa));
+        let omega = travel.turned.max(pace * speed.omega);
+        let kappa = travel.steered.max(pace * speed.kappa);
+        let stray = (STRAY * forward).max(STRAYED * self.strayed).max(pace * speed.rho * STRAY);
+        if stray < forward / 2.0 {
+            Course { heading, rho: forward.max(pace * speed.rho), stray, omega, kappa }
+        } else {
+            Course::from(Speed { rho: farthest.max(pace * speed.rho), omega, kappa })
         }
     }
 
@@ -107,97 +166,155 @@ impl EventDriven {
     pub fn settle(&mut self, frame: &Frame) {
         let mut fresh = std::mem::take(&mut self.fresh);
         fresh.retain(|event| self.queue.is_valid(event));
-        let (clock, now) = (self.clock, self.odometers[self.clock].now());
+        let mut left = &fresh[..];
+        let next = |_: &mut EventQueue, due: &mut [Event; LANES]| {
+            let (now, later) = left.split_at(left.len().min(LANES));
+            due[..now.len()].copy_from_slice(now);
+            left = later;
+            now.len()
+        };
         // A node that no view wants is active where another needs it: its time to fold is the next motion.
-        self.process(&fresh, frame, |event, queue| queue.schedule(clock, now, 0.0, *event));
+        self.process(frame, next, |event, queue| queue.schedule_ticks(0, *event));
         fresh.clear();
         self.fresh = fresh;
     }
 
-    /// Tests events, calls `flip` for those whose nodes should change and schedules the others.
-    fn process(&mut self, due: &[Event], frame: &Frame, flip: impl FnMut(&Event, &mut EventQueue)) {
-        let (clock, now) = (self.clock, self.odometers[self.clock].now());
-        let bench = Bench { frame, speed: skew(&frame.speed, clock), clock, now };
+    /// Tests the events that `next` puts into its second argument, as many as it returns, until it returns 0. Calls `flip`
+    /// for those whose nodes should change and schedules the others.
+    fn process(
+        &mut self,
+        frame: &Frame,
+        next: impl FnMut(&mut EventQueue, &mut [Event; LANES]) -> usize,
+        flip: impl FnMut(&Event, &mut OnClock),
+    ) {
+        let bench = Bench { frame, course: self.clocks[self.clock].course, clock: self.clock };
         match Lenses::new(frame.criterion, frame.views) {
-            Some(lenses) => process(due, lenses.as_slice(), &bench, &mut self.queue, flip),
-            None => process_plainly(due, &bench, &mut self.queue, flip),
+            Some(lenses) => process(&mut self.queue, lenses.as_slice(), &bench, next, flip),
+            None => process_plainly(&mut self.queue, &bench, next, flip),
         }
     }
 
-    pub fn watch(&mut self, node: NodeId, kind: Kind, bounds: Bounds) {
-        self.fresh.push(self.queue.event(node, kind, bounds));
+    pub fn watch(&mut self, slot: Slot, kind: Kind, bounds: Bounds) {
+        self.fresh.push(self.queue.event(slot, kind, bounds));
     }
 
-    pub fn unwatch(&mut self, node: NodeId) {
-        self.queue.cancel(node);
+    pub fn unwatch(&mut self, slot: Slot) {
+        self.queue.cancel(slot);
     }
 
-    pub fn refused(&mut self, node: NodeId, kind: Kind, bounds: Bounds) {
-        self.queue.press(self.queue.event(node, kind, bounds));
+    pub fn prefetch(&self, slot: Slot) {
+        self.queue.prefetch(slot);
+    }
+
+    pub fn refused(&mut self, slot: Slot, kind: Kind, bounds: Bounds) {
+        let event = self.queue.event(slot, kind, bounds);
+        self.queue.press(event);
     }
 }
 
-/// What an event is tested with, and where it waits after that.
+/// What a frame on a course costs: about in proportion to the tests that it makes due. The declared speeds say how
+/// movement and turning compare.
+fn cost(course: &Course, speed: &Speed) -> f64 {
+    let share = |amount: f64, rate: f64| if rate > 0.0 { amount / rate } else { 0.0 };
+    // Half of all directions are ahead, more or less.
+    share(0.5 * course.rho + course.stray, speed.rho)
+        + share(course.omega, speed.omega)
+        + share(course.kappa, speed.kappa)
+}
+
+/// What events are tested with.
 struct Bench<'a> {
     frame: &'a Frame<'a>,
-    /// Of the clock.
-    speed: Speed,
+    /// The clock that they wait on after that, and its course.
     clock: usize,
-    now: f64,
+    course: Course,
 }
 
-#[multiversion(targets("x86_64+avx2", "x86_64+sse4.1"))]
+impl Bench<'_> {
+    /// Tests one event in f64.
+    fn test(&self, event: &Event, queue: &mut OnClock, flip: &mut impl FnMut(&Event, &mut OnClock)) {
+        let Self { frame, course, .. } = self;
+        let frames = match event.kind() {
+            Kind::Unfold => frame.criterion.earliest_unfold(frame.views, course, &event.bounds),
+            Kind::Fold => frame.criterion.earliest_fold(frame.views, course, &event.bounds),
+        };
+        // A positive bound says that nothing can have changed yet; only then is the predicate spared.
+        if frames == 0.0 && frame.unfold(&event.bounds) == (event.kind() == Kind::Unfold) {
+            flip(event, queue);
+        } else {
+            queue.schedule(frames, *event);
+        }
+    }
+}
+
+/// Events to be tested together.
+struct Batch {
+    events: [Event; LANES],
+    count: usize,
+    block: Block,
+}
+
+impl Batch {
+    const EMPTY: Self = Self { events: [Event::BLANK; LANES], count: 0, block: Block::EMPTY };
+
+    #[inline(always)]
+    fn fill(&mut self, count: usize) {
+        self.count = count;
+        for (lane, event) in self.events.iter().enumerate() {
+            self.block.set(lane, &event.bounds, event.tag());
+        }
+    }
+}
+
+#[multiversion(targets("x86_64+avx2+lzcnt+bmi1+bmi2", "x86_64+sse4.1"))]
 fn process(
-    due: &[Event],
+    queue: &mut EventQueue,
     lenses: &[Lens],
     bench: &Bench,
-    queue: &mut EventQueue,
-    mut flip: impl FnMut(&Event, &mut EventQueue),
+    mut next: impl FnMut(&mut EventQueue, &mut [Event; LANES]) -> usize,
+    mut flip: impl FnMut(&Event, &mut OnClock),
 ) {
-    let mut block = Block::EMPTY;
-    for events in due.chunks(LANES) {
-        for (lane, event) in events.iter().enumerate() {
-            block.set(lane, &event.bounds, u32::from(event.kind() == Kind::Fold));
-        }
-        let frames = earliest(&block, lenses, &bench.speed);
-        for (event, &frames) in events.iter().zip(&frames) {
-            if frames > 0.0 {
-                queue.schedule(bench.clock, bench.now, f64::from(frames), *event);
+    let rates = Rates::new(&bench.course);
+    let mut batches = [const { Batch::EMPTY }; 2];
+    let [batch, following] = &mut batches;
+    let (mut batch, mut following) = (batch, following);
+    let count = next(queue, &mut batch.events);
+    batch.fill(count);
+    while batch.count > 0 {
+        // One ahead: what has just been written member by member can not be read as a vector at once.
+        let count = next(queue, &mut following.events);
+        following.fill(count);
+        let frames = earliest(&batch.block, lenses, &rates);
+        // To multiply by a power of two is exact; what is further than the horizon makes no difference.
+        let ticks =
+            frames.map(|frames| (frames * TICKS_PER_FRAME as f32).min(HORIZON as f32 / 2.0) as i32 as u32);
+        let mut queue = queue.on(bench.clock);
+        for (lane, event) in batch.events[..batch.count].iter().enumerate() {
+            if frames[lane % LANES] > 0.0 {
+                queue.schedule_ticks(ticks[lane % LANES], *event);
             } else {
-                test(event, bench, queue, &mut flip);
+                bench.test(event, &mut queue, &mut flip);
             }
         }
+        std::mem::swap(&mut batch, &mut following);
     }
 }
 
 /// Without the filter, for more views than it takes.
 fn process_plainly(
-    due: &[Event],
-    bench: &Bench,
     queue: &mut EventQueue,
-    mut flip: impl FnMut(&Event, &mut EventQueue),
-) {
-    for event in due {
-        test(event, bench, queue, &mut flip);
-    }
-}
-
-/// Tests one event in f64.
-fn test(
-    event: &Event,
     bench: &Bench,
-    queue: &mut EventQueue,
-    flip: &mut impl FnMut(&Event, &mut EventQueue),
+    mut next: impl FnMut(&mut EventQueue, &mut [Event; LANES]) -> usize,
+    mut flip: impl FnMut(&Event, &mut OnClock),
 ) {
-    let Bench { frame, speed, clock, now } = bench;
-    let frames = match event.kind() {
-        Kind::Unfold => frame.criterion.earliest_unfold(frame.views, speed, &event.bounds),
-        Kind::Fold => frame.criterion.earliest_fold(frame.views, speed, &event.bounds),
-    };
-    // A positive bound says that nothing can have changed yet; only then is the predicate spared.
-    if frames == 0.0 && frame.unfold(&event.bounds) == (event.kind() == Kind::Unfold) {
-        flip(event, queue);
-    } else {
-        queue.schedule(*clock, *now, frames, *event);
+    let mut events = [Event::BLANK; LANES];
+    loop {
+        let count = next(queue, &mut events);
+        for event in &events[..count] {
+            bench.test(event, &mut queue.on(bench.clock), &mut flip);
+        }
+        if count == 0 {
+            return;
+        }
     }
 }

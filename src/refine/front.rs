@@ -4,26 +4,24 @@
 //! instructions. Half of the nodes that top-down visits lie above the front and need no test.
 
 use multiversion::multiversion;
-use vertex_tree::{Bounds, NodeId};
+use vertex_tree::Bounds;
 
 use super::{Flips, Frame};
 use crate::filter::{Lens, Lenses, certainly, doubtful, for_each_bit};
+use crate::front::Slot;
 use crate::packed::Packed;
 use crate::queue::Kind;
 
+#[derive(Default)]
 pub(crate) struct FrontScan {
     /// Boundary nodes, and collapsible nodes.
     folded: Packed,
     unfolded: Packed,
-    /// For each node, twice the place of its entry in one of the two, plus 1 in the second, plus 2; or 0.
+    /// For each slot, twice the place of its entry in one of the two, plus 1 in the second, plus 2; or 0.
     place: Vec<u32>,
 }
 
 impl FrontScan {
-    pub fn new(node_limit: u32) -> Self {
-        Self { folded: Packed::default(), unfolded: Packed::default(), place: vec![0; node_limit as usize] }
-    }
-
     pub fn find(&self, frame: &Frame, flips: &mut Flips) {
         flips.tests += (self.folded.len() + self.unfolded.len()) as u64;
         let lenses = Lenses::new(frame.criterion, frame.views);
@@ -31,17 +29,21 @@ impl FrontScan {
         scan(&self.unfolded, Kind::Fold, lenses.as_ref().map(Lenses::as_slice), frame, &mut flips.fold);
     }
 
-    pub fn watch(&mut self, node: NodeId, kind: Kind, bounds: Bounds) {
-        if self.place[node.index()] == 0 {
+    pub fn watch(&mut self, slot: Slot, kind: Kind, bounds: Bounds) {
+        if self.place.len() <= slot.index() {
+            self.place.resize(slot.index() + 1, 0);
+        }
+        if self.place[slot.index()] == 0 {
             let packed = self.packed(kind == Kind::Fold);
-            packed.push(&bounds, node.0);
+            packed.push(&bounds, slot.0);
             let at = packed.len() as u32 - 1;
-            self.place[node.index()] = 2 * at + u32::from(kind == Kind::Fold) + 2;
+            self.place[slot.index()] = 2 * at + u32::from(kind == Kind::Fold) + 2;
         }
     }
 
-    pub fn unwatch(&mut self, node: NodeId) {
-        let Some(place) = std::mem::take(&mut self.place[node.index()]).checked_sub(2) else { return };
+    pub fn unwatch(&mut self, slot: Slot) {
+        let Some(place) = self.place.get_mut(slot.index()) else { return };
+        let Some(place) = std::mem::take(place).checked_sub(2) else { return };
         if let Some(moved) = self.packed(place % 2 == 1).swap_remove(place as usize / 2) {
             self.place[moved as usize] = place + 2;
         }
@@ -54,7 +56,7 @@ impl FrontScan {
 
 /// Appends the nodes among `packed` that must flip. Without lenses the filter is passed over.
 #[multiversion(targets("x86_64+avx2", "x86_64+sse4.1"))]
-fn scan(packed: &Packed, kind: Kind, lenses: Option<&[Lens]>, frame: &Frame, flips: &mut Vec<NodeId>) {
+fn scan(packed: &Packed, kind: Kind, lenses: Option<&[Lens]>, frame: &Frame, flips: &mut Vec<Slot>) {
     for (block, used) in packed.blocks() {
         let mask = match lenses {
             // A boundary node flips unless it is certainly not wanted, a collapsible one unless it certainly is.
@@ -66,7 +68,7 @@ fn scan(packed: &Packed, kind: Kind, lenses: Option<&[Lens]>, frame: &Frame, fli
         };
         for_each_bit(mask, |lane| {
             if frame.unfold(&block.bounds(lane)) == (kind == Kind::Unfold) {
-                flips.push(NodeId(block.tag[lane]));
+                flips.push(Slot(block.tag[lane]));
             }
         });
     }

@@ -16,10 +16,10 @@
 //! know of a tolerance that changes, as under a budget.
 
 use glam::DVec3;
-use vertex_tree::{Bounds, NodeId};
+use vertex_tree::Bounds;
 
 use super::{Flips, Frame};
-use crate::front::Front;
+use crate::front::{Front, Slot};
 use crate::queue::Kind;
 use crate::view::View;
 
@@ -28,7 +28,7 @@ const HORIZON: u64 = 4096;
 
 #[derive(Clone, Copy)]
 struct Entry {
-    node: NodeId,
+    slot: Slot,
     kind: Kind,
     ticket: u32,
 }
@@ -40,16 +40,13 @@ pub(crate) struct Published {
     due: Vec<Entry>,
 }
 
-impl Published {
-    pub fn new(node_limit: u32) -> Self {
-        Self {
-            lists: vec![Vec::new(); HORIZON as usize],
-            frame: 0,
-            tickets: vec![0; node_limit as usize],
-            due: Vec::new(),
-        }
+impl Default for Published {
+    fn default() -> Self {
+        Self { lists: vec![Vec::new(); HORIZON as usize], frame: 0, tickets: Vec::new(), due: Vec::new() }
     }
+}
 
+impl Published {
     pub fn find(&mut self, frame: &Frame, before: &[View], front: &Front, flips: &mut Flips) {
         let first = self.frame + 1;
         self.frame += frames_passed(frame, before);
@@ -58,14 +55,14 @@ impl Published {
             self.due.append(&mut self.lists[(at % HORIZON) as usize]);
         }
         let mut due = std::mem::take(&mut self.due);
-        due.retain(|e| self.tickets[e.node.index()] == e.ticket);
+        due.retain(|e| self.tickets[e.slot.index()] == e.ticket);
         flips.tests += due.len() as u64;
         for entry in &due {
-            let bounds = front.bounds(entry.node);
+            let bounds = front.bounds(entry.slot);
             if frame.unfold(&bounds) == (entry.kind == Kind::Unfold) {
                 match entry.kind {
-                    Kind::Unfold => flips.unfold.push(entry.node),
-                    Kind::Fold => flips.fold.push(entry.node),
+                    Kind::Unfold => flips.unfold.push(entry.slot),
+                    Kind::Fold => flips.fold.push(entry.slot),
                 }
             } else {
                 self.insert(frames_until(frame, entry.kind, &bounds), *entry);
@@ -74,19 +71,26 @@ impl Published {
         self.due = due;
     }
 
-    pub fn watch(&mut self, frame: &Frame, node: NodeId, kind: Kind, bounds: &Bounds) {
-        let ticket = self.tickets[node.index()];
-        self.insert(frames_until(frame, kind, bounds), Entry { node, kind, ticket });
+    pub fn watch(&mut self, frame: &Frame, slot: Slot, kind: Kind, bounds: &Bounds) {
+        let ticket = *self.ticket(slot);
+        self.insert(frames_until(frame, kind, bounds), Entry { slot, kind, ticket });
     }
 
-    pub fn refused(&mut self, _: &Frame, node: NodeId, kind: Kind) {
-        let ticket = self.tickets[node.index()];
-        self.insert(1.0, Entry { node, kind, ticket });
+    pub fn refused(&mut self, slot: Slot, kind: Kind) {
+        let ticket = *self.ticket(slot);
+        self.insert(1.0, Entry { slot, kind, ticket });
     }
 
-    pub fn unwatch(&mut self, node: NodeId) {
-        let ticket = &mut self.tickets[node.index()];
+    pub fn unwatch(&mut self, slot: Slot) {
+        let ticket = self.ticket(slot);
         *ticket = ticket.wrapping_add(1);
+    }
+
+    fn ticket(&mut self, slot: Slot) -> &mut u32 {
+        if self.tickets.len() <= slot.index() {
+            self.tickets.resize(slot.index() + 1, 0);
+        }
+        &mut self.tickets[slot.index()]
     }
 
     fn insert(&mut self, frames: f64, entry: Entry) {

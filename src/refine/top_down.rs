@@ -4,7 +4,7 @@
 //! walk where nothing has changed since: memory is read in sequence.
 
 use super::{Flips, Frame};
-use crate::front::Front;
+use crate::front::{Front, Slot};
 use vertex_tree::{Bounds, NONE};
 
 #[derive(Default)]
@@ -27,21 +27,21 @@ impl TopDown {
         self.stack.clear();
         self.stack.extend_from_slice(front.root_pairs());
         while let Some(pair) = self.stack.pop() {
-            for record in front.pair(pair) {
+            for (record, slot) in front.pair(pair).iter().zip([2 * pair, 2 * pair + 1].map(Slot)) {
                 if record.node.0 == NONE {
                     continue;
                 }
                 flips.tests += 1;
-                front.descend(record, &mut self.stack);
+                self.stack.extend_from_slice(front.below(record));
                 let (wanted, active) = (unfold(&record.bounds), record.is_active());
                 if wanted != active {
                     if wanted {
                         if record.is_boundary() {
-                            flips.unfold.push(record.node);
+                            flips.unfold.push(slot);
                         }
                     } else if record.is_collapsible() {
                         // The rest of a subtree that has to go follows from its lowest nodes upwards.
-                        flips.fold.push(record.node);
+                        flips.fold.push(slot);
                     }
                 }
             }

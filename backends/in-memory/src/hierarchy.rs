@@ -1,168 +1,212 @@
-//! The static part of the tree: nodes, leaves and triangles in depth-first order.
+//! The static part of the tree: what unfolding and folding a node asks for, where fronts find it together.
 //!
-//! Nodes are numbered in preorder, the child with the kept vertex first, and leaves in the order in which that walk
-//! meets them. So
+//! Leaves are numbered depth-first, the side of the kept vertex before the other, so every subtree is an interval of
+//! leaves, and the vertex shown for a folded node is the first leaf of its interval, as a collapse keeps the place of the
+//! kept vertex: see [`StarMesh`](vertex_tree::StarMesh).
 //!
-//! * every subtree is an interval of nodes and an interval of leaves;
-//! * the vertex shown for a folded node is the first leaf of its interval, as a collapse keeps the place of the kept
-//!   vertex: vertices are numbered as leaves;
-//! * the children of a node follow from the number of leaves on its left side;
-//! * the triangles that a node brings when it unfolds, sorted by node, are an interval too.
+//! Nodes are numbered by octaves of their error, from large to small, and depth-first within an octave. The nodes that a
+//! front can reach next have errors that are close in number wherever they are close in space: what a frame changes lies
+//! in few pages of memory. In depth-first order every node of a front would be in a page of its own, with all that lies
+//! below it between, and translating addresses would take longer than anything else.
+//!
+//! What belongs to a node, its removed vertex and the triangles that it brings, is sorted like the nodes.
 
-use vertex_tree::{Bounds, CollapseLog, LogError, NONE, NodeId};
+use vertex_tree::{Bounds, CollapseLog, Forest, LeafTriangle, LogError, NONE, NodeId};
 
 /// An inner node: one cache line that holds all that unfolding it asks for.
 #[derive(Clone, Copy, Debug)]
 #[repr(align(64))]
 pub(crate) struct Node {
-    /// The leaves below are `first..end`; those from `pivot` on are below the removed vertex, which is leaf `pivot`.
-    pub first: u32,
-    pub pivot: u32,
-    pub end: u32,
-    pub parent: u32,
-    /// The triangles that the node brings start here; they end where those of the next node start.
-    pub triangles: u32,
+    /// The leaf of the kept vertex, which is the first one below the node, and that of the removed vertex, from which on
+    /// leaves are on its side.
+    pub kept: u32,
+    pub removed: u32,
+    /// The child with the kept vertex and the other; [`NONE`] for a leaf.
+    pub children: [u32; 2],
+    /// Where the triangles start that the node brings, and in the lowest [`COUNT_BITS`] how many they are, up to
+    /// [`MANY`]: then they end where those of the next node start. Few bring more than two, and to look at the next
+    /// node would be another cache line.
+    triangles: u32,
     pub log_number: u32,
-    /// Of the child with the kept vertex and of the other; meaningless where that is a leaf.
+    /// Of the children; meaningless for a leaf.
     pub child_bounds: [Bounds; 2],
 }
 
-impl Node {
-    const BLANK: Self = Self {
-        first: 0,
-        pivot: 0,
-        end: 0,
-        parent: NONE,
-        triangles: 0,
-        log_number: 0,
-        child_bounds: [Bounds { center: [0.0; 3], radius: 0.0, eps: 0.0 }; 2],
-    };
-}
+const COUNT_BITS: u32 = 3;
+const MANY: u32 = (1 << COUNT_BITS) - 1;
+/// Triangles that the bits left over can number.
+const MOST_TRIANGLES: usize = 1 << (32 - COUNT_BITS);
 
 /// A collapse log arranged for refinement. Shared, unchanging: several trees can show it at once.
 #[derive(Clone, Debug)]
 pub struct Hierarchy {
     pub(crate) nodes: Vec<Node>,
+    /// For each node, its parent, or [`NONE`] for a root.
+    pub(crate) parents: Vec<u32>,
     pub(crate) roots: Vec<NodeId>,
     /// Of each root.
     pub(crate) root_bounds: Vec<Bounds>,
-    /// The vertices of the base mesh.
-    pub(crate) base_vertices: Vec<u32>,
-    /// Input vertex of each leaf, and its position.
-    pub(crate) input_vertex: Vec<u32>,
+    /// Where the removed vertex of each node is.
     pub(crate) positions: Vec<[f32; 3]>,
-    /// Three leaves each, sorted by the node that brings them; those of the base mesh last.
-    pub(crate) corners: Vec<[u32; 3]>,
-    pub(crate) input_triangle: Vec<u32>,
+    /// The vertices of the base mesh: leaf and position.
+    pub(crate) base_vertices: Vec<(u32, [f32; 3])>,
+    /// Input vertex of each leaf.
+    pub(crate) input_vertex: Vec<u32>,
+    /// The triangles, known by their numbers in the input, sorted by the node that brings them; those of the base mesh
+    /// last.
+    pub(crate) triangles: Vec<LeafTriangle>,
     /// How many triangles some node brings.
     pub(crate) refining: u32,
+}
+
+/// Leaves of a log, depth-first.
+struct Leaves {
+    /// For each collapse, the first leaf below it, that of its removed vertex, and the end of the leaves below it.
+    kept: Vec<u32>,
+    removed: Vec<u32>,
+    end: Vec<u32>,
+    of_vertex: Vec<u32>,
+}
+
+impl Leaves {
+    fn new(log: &CollapseLog, forest: &Forest) -> Self {
+        let (count, vertices) = (log.collapses.len(), log.mesh.positions.len());
+        // How many are below each node. Children come before their parents in the log.
+        let mut below = vec![0_u32; count];
+        let leaves = |below: &[u32], child: u32| if child == NONE { 1 } else { below[child as usize] };
+        for n in 0..count {
+            below[n] = leaves(&below, forest.kept_child[n]) + leaves(&below, forest.removed_child[n]);
+        }
+        // Intervals, from the roots down. A root takes the next free one, any other node's was fixed by its parent.
+        let mut all = Self {
+            kept: vec![NONE; count],
+            removed: below.clone(),
+            end: below.clone(),
+            of_vertex: vec![NONE; vertices],
+        };
+        let mut next = 0;
+        for n in (0..count).rev() {
+            if forest.parent[n] == NONE {
+                all.kept[n] = next;
+                next += below[n];
+            }
+            let first = all.kept[n];
+            let removed = first + leaves(&below, forest.kept_child[n]);
+            all.removed[n] = removed;
+            all.end[n] = first + below[n];
+            let c = &log.collapses[n];
+            for (child, vertex, at) in
+                [(forest.kept_child[n], c.kept, first), (forest.removed_child[n], c.removed, removed)]
+            {
+                match child {
+                    NONE => all.of_vertex[vertex as usize] = at,
+                    child => all.kept[child as usize] = at,
+                }
+            }
+        }
+        for leaf in all.of_vertex.iter_mut().filter(|leaf| **leaf == NONE) {
+            *leaf = next;
+            next += 1;
+        }
+        debug_assert_eq!(next as usize, vertices);
+        all
+    }
+}
+
+/// Collapses in the order in which their nodes are numbered: by octaves of the error, then depth-first.
+fn order(log: &CollapseLog, leaves: &Leaves) -> Vec<u32> {
+    // The exponent of a positive number is the top of its bits. Nodes without any error are the last ones.
+    let octave = |eps: f32| u64::from(!(eps.to_bits() >> 23) & 0x1ff);
+    // Of those with the same first leaf the larger one, which is above, comes first.
+    let key = |n: u32| {
+        let (kept, end) = (leaves.kept[n as usize], leaves.end[n as usize]);
+        (octave(log.collapses[n as usize].bounds.eps) << 32 | u64::from(kept), u32::MAX - end)
+    };
+    let mut order: Vec<(u64, u32, u32)> =
+        (0..log.collapses.len() as u32).map(|n| (key(n).0, key(n).1, n)).collect();
+    order.sort_unstable();
+    order.into_iter().map(|(.., n)| n).collect()
 }
 
 impl Hierarchy {
     /// Arranges a log.
     ///
     /// # Errors
-    /// What [`CollapseLog::forest`] finds wrong with it.
+    /// What [`CollapseLog::forest`] finds wrong with it, and [`LogError::TooManyTriangles`].
     pub fn new(log: &CollapseLog) -> Result<Self, LogError> {
         let forest = log.forest()?;
-        let count = log.collapses.len();
-        let vertices = log.mesh.positions.len();
-
-        // Leaves below each node. Children come before their parents in the log.
-        let mut leaves = vec![0_u32; count];
-        let below = |leaves: &[u32], child: u32| if child == NONE { 1 } else { leaves[child as usize] };
-        for n in 0..count {
-            leaves[n] = below(&leaves, forest.kept_child[n]) + below(&leaves, forest.removed_child[n]);
+        if log.mesh.triangles.len() >= MOST_TRIANGLES {
+            return Err(LogError::TooManyTriangles {
+                triangles: log.mesh.triangles.len(),
+                most: MOST_TRIANGLES - 1,
+            });
         }
-
-        // Numbers, from the roots down: a subtree of m leaves has m - 1 nodes.
-        let mut number = vec![0_u32; count];
-        let mut nodes = vec![Node::BLANK; count];
-        let mut root_bounds = Vec::new();
-        let mut input_vertex = vec![0_u32; vertices];
-        let mut roots = Vec::new();
-        let mut base_vertices = Vec::new();
-        let (mut next_node, mut next_leaf) = (0, 0);
-        for n in (0..count).rev() {
-            let c = &log.collapses[n];
-            let (kept, removed) = (forest.kept_child[n], forest.removed_child[n]);
-            let parent = forest.parent[n];
-            // A root takes the next free interval; any other node's place was fixed by its parent.
-            if parent == NONE {
-                number[n] = next_node;
-                nodes[next_node as usize].first = next_leaf;
-                roots.push(NodeId(next_node));
-                root_bounds.push(c.bounds);
-                base_vertices.push(next_leaf);
-                next_node += leaves[n] - 1;
-                next_leaf += leaves[n];
-            }
-            let id = number[n];
-            let first = nodes[id as usize].first;
-            let left = below(&leaves, kept);
-            let pivot = first + left;
-            let node = &mut nodes[id as usize];
-            node.pivot = pivot;
-            node.end = first + leaves[n];
-            node.log_number = n as u32;
-            for (side, (child, vertex, child_id, child_first)) in
-                [(kept, c.kept, id + 1, first), (removed, c.removed, id + left, pivot)]
-                    .into_iter()
-                    .enumerate()
-            {
-                if child == NONE {
-                    input_vertex[child_first as usize] = vertex;
-                } else {
-                    number[child as usize] = child_id;
-                    nodes[child_id as usize].first = child_first;
-                    nodes[child_id as usize].parent = id;
-                    nodes[id as usize].child_bounds[side] = log.collapses[child as usize].bounds;
-                }
-            }
+        let leaves = Leaves::new(log, &forest);
+        let order = order(log, &leaves);
+        let mut number = vec![NONE; order.len()];
+        for (id, &n) in (0..).zip(&order) {
+            number[n as usize] = id;
         }
-        for (v, &root) in (0..).zip(&forest.root_of_vertex) {
-            if root == NONE {
-                input_vertex[next_leaf as usize] = v;
-                base_vertices.push(next_leaf);
-                next_leaf += 1;
+        let numbered = |n: u32| if n == NONE { NONE } else { number[n as usize] };
+        let bounds = |n: u32| {
+            let nowhere = Bounds { center: [0.0; 3], radius: 0.0, eps: 0.0 };
+            log.collapses.get(n as usize).map_or(nowhere, |collapse| collapse.bounds)
+        };
+        let node = |&n: &u32| {
+            let children = [forest.kept_child[n as usize], forest.removed_child[n as usize]];
+            Node {
+                kept: leaves.kept[n as usize],
+                removed: leaves.removed[n as usize],
+                children: children.map(numbered),
+                triangles: 0,
+                log_number: n,
+                child_bounds: children.map(bounds),
             }
+        };
+        let nodes: Vec<Node> = order.iter().map(node).collect();
+        let roots: Vec<u32> = (0..)
+            .zip(&order)
+            .filter(|&(_, &n)| forest.parent[n as usize] == NONE)
+            .map(|(id, _)| id)
+            .collect();
+        let position = |vertex: u32| log.mesh.positions[vertex as usize];
+        let mut input_vertex = vec![0; leaves.of_vertex.len()];
+        for (vertex, &leaf) in (0..).zip(&leaves.of_vertex) {
+            input_vertex[leaf as usize] = vertex;
         }
-        debug_assert_eq!(next_leaf as usize, vertices);
-
+        let lone = (0..).zip(&forest.root_of_vertex).filter(|&(_, &root)| root == NONE);
+        let base = roots.iter().map(|&id| nodes[id as usize].kept);
+        let base = base.chain(lone.map(|(vertex, _): (u32, _)| leaves.of_vertex[vertex as usize]));
         let mut hierarchy = Self {
+            parents: order.iter().map(|&n| numbered(forest.parent[n as usize])).collect(),
+            root_bounds: roots.iter().map(|&id| bounds(nodes[id as usize].log_number)).collect(),
+            base_vertices: base.map(|leaf| (leaf, position(input_vertex[leaf as usize]))).collect(),
+            roots: roots.into_iter().map(NodeId).collect(),
+            positions: order.iter().map(|&n| position(log.collapses[n as usize].removed)).collect(),
             nodes,
-            roots,
-            root_bounds,
-            base_vertices,
-            positions: input_vertex.iter().map(|&v| log.mesh.positions[v as usize]).collect(),
             input_vertex,
-            corners: Vec::new(),
-            input_triangle: Vec::new(),
+            triangles: Vec::new(),
             refining: 0,
         };
-        hierarchy.sort_triangles(&log.mesh.triangles);
+        hierarchy.sort_triangles(&log.mesh.triangles, &leaves, &order);
         Ok(hierarchy)
     }
 
     /// Counting sort of the triangles by the node that brings them.
-    fn sort_triangles(&mut self, triangles: &[[u32; 3]]) {
+    fn sort_triangles(&mut self, triangles: &[[u32; 3]], leaves: &Leaves, order: &[u32]) {
         let count = self.nodes.len();
-        let mut leaf_of_vertex = vec![0_u32; self.input_vertex.len()];
-        for (leaf, &v) in (0..).zip(&self.input_vertex) {
-            leaf_of_vertex[v as usize] = leaf;
-        }
         let mut above_leaf = vec![NONE; self.input_vertex.len()];
         for (id, node) in (0..).zip(&self.nodes) {
-            for (start, end) in [(node.first, node.pivot), (node.pivot, node.end)] {
-                if end - start == 1 {
-                    above_leaf[start as usize] = id;
+            for (child, leaf) in node.children.into_iter().zip([node.kept, node.removed]) {
+                if child == NONE {
+                    above_leaf[leaf as usize] = id;
                 }
             }
         }
-        let owner: Vec<u32> = triangles
-            .iter()
-            .map(|corners| self.bringer(corners.map(|v| leaf_of_vertex[v as usize]), &above_leaf))
-            .collect();
+        let ends: Vec<u32> = order.iter().map(|&n| leaves.end[n as usize]).collect();
+        let leaves = |corners: [u32; 3]| corners.map(|v| leaves.of_vertex[v as usize]);
+        let owner: Vec<u32> =
+            triangles.iter().map(|&corners| self.bringer(leaves(corners), &above_leaf, &ends)).collect();
         // Base triangles count as brought by a node after the last. Triangles with a doubled corner are never
         // shown: they go behind them.
         let bucket = |t: usize| match owner[t] {
@@ -176,43 +220,60 @@ impl Hierarchy {
         for n in 0..=count {
             start[n + 1] += start[n];
         }
-        for (node, &at) in self.nodes.iter_mut().zip(&start) {
-            node.triangles = at;
+        for (node, bounds) in self.nodes.iter_mut().zip(start.windows(2)) {
+            node.triangles = bounds[0] << COUNT_BITS | (bounds[1] - bounds[0]).min(MANY);
         }
         self.refining = start[count];
-        self.corners = vec![[0; 3]; triangles.len()];
-        self.input_triangle = vec![0; triangles.len()];
-        for (t, corners) in triangles.iter().enumerate() {
-            let at = &mut start[bucket(t)];
-            self.corners[*at as usize] = corners.map(|v| leaf_of_vertex[v as usize]);
-            self.input_triangle[*at as usize] = t as u32;
+        self.triangles = vec![LeafTriangle::new([0; 3], 0, 0); triangles.len()];
+        for (t, &corners) in (0..).zip(triangles) {
+            let corners = leaves(corners);
+            let at = &mut start[bucket(t as usize)];
+            let is_far = |&leaf: &u32| match self.nodes.get(owner[t as usize] as usize) {
+                Some(node) => !(node.kept..ends[owner[t as usize] as usize]).contains(&leaf),
+                None => false,
+            };
+            let far = corners.iter().position(is_far).unwrap_or(0) as u32;
+            self.triangles[*at as usize] = LeafTriangle::new(corners, far, t);
             *at += 1;
         }
     }
 
     /// The node at which two corners of a triangle merge first: the lower one of their lowest common ancestors.
     /// [`NONE`] if all corners stay apart, or if two are the same leaf.
-    fn bringer(&self, mut leaves: [u32; 3], above_leaf: &[u32]) -> u32 {
+    fn bringer(&self, mut leaves: [u32; 3], above_leaf: &[u32], ends: &[u32]) -> u32 {
         leaves.sort_unstable();
         let [a, b, c] = leaves;
         if a == b || b == c {
             return NONE;
         }
-        // Of lca(a, b) and lca(b, c), one lies below or at the other, if both exist: the one with fewer leaves.
-        let span = |n: u32| {
-            if n == NONE { u32::MAX } else { self.nodes[n as usize].end - self.nodes[n as usize].first }
+        let lowest_common_ancestor = |low: u32, high: u32| {
+            let mut n = above_leaf[low as usize];
+            while n != NONE && ends[n as usize] <= high {
+                n = self.parents[n as usize];
+            }
+            n
         };
-        let (ab, bc) =
-            (self.lowest_common_ancestor(a, b, above_leaf), self.lowest_common_ancestor(b, c, above_leaf));
+        // Of lca(a, b) and lca(b, c), one lies below or at the other, if both exist: the one with fewer leaves.
+        let span = |n: u32| if n == NONE { u32::MAX } else { ends[n as usize] - self.nodes[n as usize].kept };
+        let (ab, bc) = (lowest_common_ancestor(a, b), lowest_common_ancestor(b, c));
         if span(ab) <= span(bc) { ab } else { bc }
     }
 
-    fn lowest_common_ancestor(&self, low: u32, high: u32, above_leaf: &[u32]) -> u32 {
-        let mut n = above_leaf[low as usize];
-        while n != NONE && self.nodes[n as usize].end <= high {
-            n = self.nodes[n as usize].parent;
-        }
-        n
+    /// Where the triangles that a node brings start.
+    pub(crate) fn first_brought(&self, node: usize) -> u32 {
+        self.nodes[node].triangles >> COUNT_BITS
+    }
+
+    /// The triangles that a node brings.
+    #[inline(always)]
+    pub(crate) fn brought(&self, node: usize) -> &[LeafTriangle] {
+        let start = self.first_brought(node);
+        let end = match self.nodes[node].triangles & MANY {
+            MANY if node + 1 < self.nodes.len() => self.first_brought(node + 1),
+            MANY => self.refining,
+            count => start + count,
+        };
+        &self.triangles[start as usize..end as usize]
     }
 
     /// Number in the collapse log of a node of this backend.

@@ -4,7 +4,7 @@ use std::sync::Arc;
 
 use vertex_tree::{
     Bounds, LeafTriangle, MeshSink, NONE, NodeId, PageStats, StarMesh, Step, TreeError, TriangleId, VertexId,
-    VertexTree,
+    VertexTree, prefetch,
 };
 
 use crate::Hierarchy;
@@ -45,23 +45,17 @@ impl InMemoryTree {
     /// The input triangle that is shown in a slot; `None` as for [`input_vertex`](Self::input_vertex).
     #[must_use]
     pub fn input_triangle(&self, triangle: TriangleId) -> Option<u32> {
-        let number = self.mesh.as_ref()?.number(triangle);
-        self.hierarchy.input_triangle.get(number as usize).copied()
+        Some(self.mesh.as_ref()?.number(triangle)).filter(|&number| number != NONE)
     }
 
     fn node(&self, node: NodeId) -> &Node {
         &self.hierarchy.nodes[node.index()]
     }
-
-    /// The triangles that a node brings.
-    fn brought(&self, node: NodeId) -> std::ops::Range<u32> {
-        let end = self.hierarchy.nodes.get(node.index() + 1).map_or(self.hierarchy.refining, |n| n.triangles);
-        self.hierarchy.nodes[node.index()].triangles..end
-    }
 }
 
 impl VertexTree for InMemoryTree {
     const IS_TREE: bool = true;
+    const PREPARATION: usize = 1 + StarMesh::PREPARATION;
 
     fn node_limit(&self) -> u32 {
         self.hierarchy.nodes.len() as u32
@@ -76,10 +70,14 @@ impl VertexTree for InMemoryTree {
     }
 
     fn bounds(&self, node: NodeId) -> Bounds {
-        match self.node(node).parent {
+        let h = &*self.hierarchy;
+        match h.parents[node.index()] {
             // Roots are numbered in ascending order.
-            NONE => self.hierarchy.root_bounds[self.hierarchy.roots.partition_point(|&root| root < node)],
-            parent => self.node(NodeId(parent)).child_bounds[usize::from(node.0 != parent + 1)],
+            NONE => h.root_bounds[h.roots.partition_point(|&root| root < node)],
+            parent => {
+                let parent = &h.nodes[parent as usize];
+                parent.child_bounds[usize::from(parent.children[1] == node.0)]
+            }
         }
     }
 
@@ -90,15 +88,14 @@ impl VertexTree for InMemoryTree {
 
     #[inline]
     fn children_and_bounds(&self, node: NodeId) -> impl Iterator<Item = (NodeId, Bounds)> {
-        let &Node { first, pivot, end, child_bounds, .. } = self.node(node);
-        let left = (pivot - first > 1).then_some((NodeId(node.0 + 1), child_bounds[0]));
-        let right = (end - pivot > 1).then_some((NodeId(node.0 + (pivot - first)), child_bounds[1]));
-        left.into_iter().chain(right)
+        let &Node { children, child_bounds, .. } = self.node(node);
+        let children = children.into_iter().zip(child_bounds);
+        children.filter(|&(child, _)| child != NONE).map(|(child, bounds)| (NodeId(child), bounds))
     }
 
     #[inline]
     fn parents(&self, node: NodeId) -> impl Iterator<Item = NodeId> {
-        Some(self.node(node).parent).filter(|&p| p != NONE).map(NodeId).into_iter()
+        Some(self.hierarchy.parents[node.index()]).filter(|&p| p != NONE).map(NodeId).into_iter()
     }
 
     fn log_number(&self, node: NodeId) -> u32 {
@@ -108,49 +105,68 @@ impl VertexTree for InMemoryTree {
     fn base_mesh<M: MeshSink>(&mut self, mesh: &mut M) -> Result<(), TreeError> {
         let h = &self.hierarchy;
         // A triangle with a doubled corner has no node that brings it and is no base triangle either.
-        let base = (h.refining..h.corners.len() as u32).filter(|&t| {
-            let [a, b, c] = h.corners[t as usize];
+        let is_shown = |triangle: &&LeafTriangle| {
+            let [a, b, c] = triangle.leaves;
             a != b && b != c && c != a
-        });
+        };
+        let base = h.triangles[h.refining as usize..].iter().filter(is_shown);
         if !M::KEEPS_MESH {
             self.displayed = base.count() as u64;
             return Ok(());
         }
-        let mut stars = StarMesh::new(h.positions.len());
-        for &v in &h.base_vertices {
-            stars.add_vertex(v, h.positions[v as usize], mesh);
+        let mut stars = StarMesh::new(h.input_vertex.len());
+        for &(leaf, position) in &h.base_vertices {
+            stars.add_vertex(leaf, position, mesh);
         }
-        for number in base {
-            stars.add_triangle(LeafTriangle { leaves: h.corners[number as usize], number }, mesh);
-        }
+        base.for_each(|&triangle| stars.add_triangle(triangle, mesh));
         self.displayed = stars.displayed() as u64;
         self.mesh = Some(stars);
         Ok(())
     }
 
     fn unfold<M: MeshSink>(&mut self, node: NodeId, mesh: &mut M) -> Result<Step, TreeError> {
-        let brought = self.brought(node);
-        self.displayed += brought.len() as u64;
-        let Some(stars) = self.mesh.as_mut().filter(|_| M::KEEPS_MESH) else { return Ok(Step::Done) };
         let h = &*self.hierarchy;
-        let Node { first: kept, pivot: removed, .. } = h.nodes[node.index()];
-        let brought = brought.map(|number| LeafTriangle { leaves: h.corners[number as usize], number });
-        stars.split([kept, removed], h.positions[removed as usize], brought, mesh);
+        let brought = h.brought(node.index());
+        self.displayed += brought.len() as u64;
+        if let Some(stars) = self.mesh.as_mut().filter(|_| M::KEEPS_MESH) {
+            let Node { kept, removed, .. } = h.nodes[node.index()];
+            stars.split([kept, removed], h.positions[node.index()], brought, mesh);
+        }
         Ok(Step::Done)
     }
 
     fn fold<M: MeshSink>(&mut self, node: NodeId, mesh: &mut M) -> Result<Step, TreeError> {
-        self.displayed -= self.brought(node).len() as u64;
-        let Some(stars) = self.mesh.as_mut().filter(|_| M::KEEPS_MESH) else { return Ok(Step::Done) };
-        let Node { first: kept, pivot: removed, .. } = self.hierarchy.nodes[node.index()];
-        stars.merge([kept, removed], mesh);
+        let h = &*self.hierarchy;
+        self.displayed -= h.brought(node.index()).len() as u64;
+        if let Some(stars) = self.mesh.as_mut().filter(|_| M::KEEPS_MESH) {
+            let Node { kept, removed, .. } = h.nodes[node.index()];
+            stars.merge([kept, removed], mesh);
+        }
         Ok(Step::Done)
+    }
+
+    #[inline(always)]
+    fn prepare<M: MeshSink>(&self, node: NodeId, step: usize, mesh: &M) {
+        let h = &*self.hierarchy;
+        match (step, &self.mesh) {
+            (0, _) => prefetch(&h.nodes, node.index()),
+            (step, Some(stars)) => {
+                let Node { kept, removed, .. } = h.nodes[node.index()];
+                if step == 1 {
+                    prefetch(&h.positions, node.index());
+                    prefetch(&h.triangles, h.first_brought(node.index()) as usize);
+                }
+                stars.prepare([kept, removed], h.brought(node.index()), step - 1, mesh);
+            }
+            (_, None) => {}
+        }
     }
 
     fn end_frame(&mut self) -> Result<PageStats, TreeError> {
         let h = &self.hierarchy;
-        let resident_bytes =
-            (h.nodes.len() * size_of::<Node>() + h.positions.len() * 16 + h.corners.len() * 16) as u64;
+        let resident_bytes = (h.nodes.len() * (size_of::<Node>() + 16)
+            + h.input_vertex.len() * 4
+            + h.triangles.len() * 16) as u64;
         Ok(PageStats { resident_bytes, ..PageStats::default() })
     }
 }

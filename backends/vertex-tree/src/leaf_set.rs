@@ -1,32 +1,50 @@
 //! A set of leaf numbers that answers "the largest member that is not above x" in a few words.
 
+use crate::prefetch;
+
 /// A set of numbers below a fixed limit: a tree of 64-way bit masks.
 ///
 /// The front's vertices are kept in one: numbered depth-first, the vertex that stands for a leaf is the nearest one
 /// at or below it.
 #[derive(Clone, Debug)]
 pub(crate) struct LeafSet {
-    /// `levels[0]` has a bit a number; bit `i` of `levels[l + 1]` says whether word `i` of `levels[l]` is not 0.
-    levels: Vec<Vec<u64>>,
+    /// All levels, the lowest first. It has a bit a number; above it, bit `i` of a level says whether word `i` of the one
+    /// below is not 0. The highest level is one word.
+    words: Vec<u64>,
+    /// Where each level starts.
+    starts: [usize; LEVELS],
+    levels: usize,
 }
+
+/// Enough for all `u32`.
+const LEVELS: usize = 6;
 
 impl LeafSet {
     pub fn new(limit: usize) -> Self {
-        let mut levels = Vec::new();
-        let mut words = limit;
+        let (mut starts, mut levels) = ([0; LEVELS], 0);
+        let (mut length, mut words) = (0, limit);
         loop {
             words = words.div_ceil(64).max(1);
-            levels.push(vec![0; words]);
+            starts[levels] = length;
+            levels += 1;
+            length += words;
             if words == 1 {
-                return Self { levels };
+                return Self { words: vec![0; length], starts, levels };
             }
         }
     }
 
+    /// Starts to read the lowest word that a look-up will read.
+    #[inline(always)]
+    pub fn prefetch(&self, number: u32) {
+        prefetch(&self.words, number as usize / 64);
+    }
+
+    #[inline]
     pub fn insert(&mut self, number: u32) {
         let mut at = number as usize;
-        for level in &mut self.levels {
-            let word = &mut level[at / 64];
+        for &start in &self.starts[..self.levels] {
+            let word = &mut self.words[start + at / 64];
             let was = *word;
             *word |= 1 << (at % 64);
             if was != 0 {
@@ -36,10 +54,11 @@ impl LeafSet {
         }
     }
 
+    #[inline]
     pub fn remove(&mut self, number: u32) {
         let mut at = number as usize;
-        for level in &mut self.levels {
-            let word = &mut level[at / 64];
+        for &start in &self.starts[..self.levels] {
+            let word = &mut self.words[start + at / 64];
             *word &= !(1 << (at % 64));
             if *word != 0 {
                 break;
@@ -49,22 +68,27 @@ impl LeafSet {
     }
 
     /// The largest member that is not above `number`, if there is one.
+    #[inline]
     pub fn at_or_below(&self, number: u32) -> Option<u32> {
         let mut at = number as usize;
-        for (l, level) in self.levels.iter().enumerate() {
-            // On the lowest level `at` itself counts; above, only words below the one already searched do.
-            let mask = if l == 0 { u64::MAX >> (63 - at % 64) } else { (1 << (at % 64)) - 1 };
-            let word = level[at / 64] & mask;
-            if word != 0 {
-                let mut found = at / 64 * 64 + 63 - word.leading_zeros() as usize;
-                for below in self.levels[..l].iter().rev() {
-                    found = found * 64 + 63 - below[found].leading_zeros() as usize;
-                }
-                return Some(found as u32);
-            }
+        // On the lowest level `at` itself counts; above, only words below the one already searched do.
+        let mut masked = self.words[at / 64] & (u64::MAX >> (63 - at % 64));
+        let mut level = 0;
+        while masked == 0 {
             at /= 64;
+            level += 1;
+            if level == self.levels {
+                return None;
+            }
+            masked = self.words[self.starts[level] + at / 64] & ((1 << (at % 64)) - 1);
         }
-        None
+        let last = |word: u64| 63 - word.leading_zeros() as usize;
+        let mut found = at / 64 * 64 + last(masked);
+        while level > 0 {
+            level -= 1;
+            found = found * 64 + last(self.words[self.starts[level] + found]);
+        }
+        Some(found as u32)
     }
 }
 

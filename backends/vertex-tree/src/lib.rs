@@ -15,11 +15,13 @@
 //! Leaves of the forest are the input vertices. They can not be unfolded and have no [`NodeId`].
 
 mod bounds;
+mod leaf_map;
 mod leaf_set;
 mod log;
 mod log_file;
 mod mesh;
 pub mod output;
+mod prefetch;
 mod sink;
 pub mod source;
 mod star_mesh;
@@ -30,6 +32,7 @@ pub use bounds::Bounds;
 pub use log::{Collapse, CollapseLog, Forest, LogError, NONE};
 pub use log_file::{LogCounts, LogFileError, read_log, write_log, write_log_from};
 pub use mesh::Mesh;
+pub use prefetch::prefetch;
 pub use sink::{MeshSink, NullSink, TriangleId, VertexId};
 pub use star_mesh::{LeafTriangle, StarMesh};
 pub use tree::{NodeId, PageStats, Step, TreeError, VertexTree};

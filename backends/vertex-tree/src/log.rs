@@ -68,6 +68,14 @@ pub enum LogError {
         /// As found.
         bounds: Bounds,
     },
+    /// More triangles than the backend can number.
+    #[error("{triangles} triangles, of which this backend takes {most}")]
+    TooManyTriangles {
+        /// How many there are.
+        triangles: usize,
+        /// How many there may be.
+        most: usize,
+    },
     /// A vertex position is not finite.
     #[error("vertex {vertex}: position {position:?}")]
     BadPosition {

@@ -16,6 +16,13 @@ pub trait MeshSink {
     /// triangles for a sink that does not. It must not vary between the calls to one tree.
     const KEEPS_MESH: bool = true;
 
+    /// Starts to read what is kept of a triangle into the cache: it may change soon. See
+    /// [`prefetch`](crate::prefetch()).
+    #[inline(always)]
+    fn prefetch(&self, triangle: TriangleId) {
+        let _ = triangle;
+    }
+
     /// A vertex appears at `position`, in object space.
     fn vertex_added(&mut self, vertex: VertexId, position: [f32; 3]);
     /// A vertex disappears.

@@ -14,17 +14,47 @@
 //!
 //! [`stars`]: crate::stars
 
+use crate::leaf_map::LeafMap;
 use crate::leaf_set::LeafSet;
-use crate::stars::{Corner, Stars, corner, triangle_of};
-use crate::{MeshSink, NONE, TriangleId, VertexId};
+use crate::stars::{Stars, corner, triangle_of};
+use crate::{MeshSink, NONE, TriangleId, VertexId, prefetch};
 
 /// A triangle of the hierarchy.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct LeafTriangle {
     /// The leaves of its corners, counter-clockwise.
     pub leaves: [u32; 3],
+    /// The number, and in the upper two bits which corner is the far one.
+    tag: u32,
+}
+
+impl LeafTriangle {
+    /// Numbers are below this.
+    pub const LIMIT: u32 = 1 << 30;
+
+    /// A triangle that the backend knows by `number`. For one that a node brings, corner `far` is the one whose leaf is
+    /// not below the node; for one of the base mesh it means nothing.
+    #[must_use]
+    pub fn new(leaves: [u32; 3], far: u32, number: u32) -> Self {
+        debug_assert!(far < 3 && number < Self::LIMIT);
+        Self { leaves, tag: far << 30 | number }
+    }
+
     /// Whatever number the backend knows it by.
-    pub number: u32,
+    #[must_use]
+    pub fn number(self) -> u32 {
+        self.tag & (Self::LIMIT - 1)
+    }
+
+    #[inline(always)]
+    fn far(self) -> usize {
+        (self.tag >> 30) as usize
+    }
+
+    #[inline(always)]
+    fn far_leaf(self) -> u32 {
+        self.leaves[self.far() % 3]
+    }
 }
 
 /// A triangle while it is displayed.
@@ -43,7 +73,7 @@ struct Triangle {
 pub struct StarMesh {
     shown: LeafSet,
     /// The vertex of each leaf that is shown.
-    vertex_of_leaf: Vec<VertexId>,
+    vertex_of_leaf: LeafMap,
     stars: Stars,
     triangles: Vec<Triangle>,
     /// Slots to use again. Some may lie beyond the last slot: those have been given up since.
@@ -60,7 +90,7 @@ impl StarMesh {
     pub fn new(leaves: usize) -> Self {
         Self {
             shown: LeafSet::new(leaves),
-            vertex_of_leaf: vec![NONE; leaves],
+            vertex_of_leaf: LeafMap::new(),
             stars: Stars::default(),
             triangles: Vec::new(),
             holes: Vec::new(),
@@ -90,7 +120,7 @@ impl StarMesh {
     pub fn add_vertex<M: MeshSink>(&mut self, leaf: u32, position: [f32; 3], mesh: &mut M) -> VertexId {
         let vertex = self.stars.add(leaf);
         self.shown.insert(leaf);
-        self.vertex_of_leaf[leaf as usize] = vertex;
+        self.vertex_of_leaf.insert(leaf, vertex);
         mesh.vertex_added(vertex, position);
         vertex
     }
@@ -106,17 +136,13 @@ impl StarMesh {
     /// is one.
     #[inline(always)]
     fn vertex_at(&self, leaf: u32) -> VertexId {
-        self.vertex_of_leaf[self.shown.at_or_below(leaf).unwrap_or(leaf) as usize]
+        self.vertex_of_leaf.get(self.shown.at_or_below(leaf).unwrap_or(leaf))
     }
 
     #[inline(always)]
-    fn show<M: MeshSink>(
-        &mut self,
-        LeafTriangle { leaves, number }: LeafTriangle,
-        vertices: [VertexId; 3],
-        mesh: &mut M,
-    ) {
-        let triangle = Triangle { leaves, vertices, number, _reserved: 0 };
+    fn show<M: MeshSink>(&mut self, triangle: LeafTriangle, vertices: [VertexId; 3], mesh: &mut M) {
+        let triangle =
+            Triangle { leaves: triangle.leaves, vertices, number: triangle.number(), _reserved: 0 };
         let slot = loop {
             match self.holes.pop() {
                 Some(slot) if (slot as usize) < self.triangles.len() => {
@@ -144,64 +170,102 @@ impl StarMesh {
         &mut self,
         [kept, removed]: [u32; 2],
         position: [f32; 3],
-        brought: impl Iterator<Item = LeafTriangle>,
+        brought: &[LeafTriangle],
         mesh: &mut M,
     ) {
-        let from = self.vertex_of_leaf[kept as usize];
+        let from = self.vertex_of_leaf.get(kept);
         let to = self.add_vertex(removed, position, mesh);
         let triangles = &mut self.triangles;
         self.stars.split(from, to, |corner| {
             let (t, i) = triangle_of(corner);
             let triangle = &mut triangles[t];
-            let moves = triangle.leaves[i] >= removed;
+            let moves = triangle.leaves[i % 3] >= removed;
             if moves {
-                triangle.vertices[i] = to;
-                mesh.corner_moved(t as u32, i, to);
+                triangle.vertices[i % 3] = to;
+                mesh.corner_moved(t as u32, i % 3, to);
             }
             moves
         });
-        for triangle in brought {
-            self.add_triangle(triangle, mesh);
+        for &triangle in brought {
+            let far = triangle.far();
+            let far_vertex = self.vertex_at(triangle.far_leaf());
+            let vertices = std::array::from_fn(|i| match triangle.leaves[i] {
+                _ if i == far => far_vertex,
+                leaf if leaf >= removed => to,
+                _ => from,
+            });
+            self.show(triangle, vertices, mesh);
         }
     }
 
     /// A node folds: the inverse of [`split`](Self::split).
     #[inline]
     pub fn merge<M: MeshSink>(&mut self, [kept, removed]: [u32; 2], mesh: &mut M) {
-        let to = self.vertex_of_leaf[kept as usize];
-        let from = self.vertex_of_leaf[removed as usize];
+        let to = self.vertex_of_leaf.get(kept);
+        let from = self.vertex_of_leaf.get(removed);
         while let Some(corner) = self.stars.pop(from) {
             let (t, i) = triangle_of(corner);
             let triangle = &mut self.triangles[t];
-            if triangle.vertices.contains(&to) {
-                self.hide(corner, mesh);
+            let [a, b, c] = triangle.vertices;
+            if (a == to) | (b == to) | (c == to) {
+                for (j, vertex) in [a, b, c].into_iter().enumerate().filter(|&(j, _)| j != i) {
+                    self.stars.take(vertex, self::corner(t as u32, j));
+                }
+                triangle.number = NONE;
+                self.holes.push(t as u32);
+                self.displayed -= 1;
+                mesh.triangle_removed(t as u32);
             } else {
-                triangle.vertices[i] = to;
+                triangle.vertices[i % 3] = to;
                 self.stars.push(to, corner);
-                mesh.corner_moved(t as u32, i, to);
+                mesh.corner_moved(t as u32, i % 3, to);
             }
         }
         self.stars.remove(from);
         self.shown.remove(removed);
-        self.vertex_of_leaf[removed as usize] = NONE;
+        self.vertex_of_leaf.remove(removed);
         mesh.vertex_removed(from);
         while self.triangles.len() - self.displayed > self.triangles.len() / HOLES + 256 {
             self.close_hole(mesh);
         }
     }
 
-    /// Removes a triangle of which one corner, `taken`, is in no star any more.
+    /// Steps of [`prepare`](Self::prepare).
+    pub const PREPARATION: usize = 3;
+
+    /// Starts to read what a split or a merge of these leaves will read, step by step: see
+    /// [`VertexTree::prepare`](crate::VertexTree::prepare).
     #[inline(always)]
-    fn hide<M: MeshSink>(&mut self, taken: Corner, mesh: &mut M) {
-        let (t, taken) = triangle_of(taken);
-        let vertices = self.triangles[t].vertices;
-        for i in (0..3).filter(|&i| i != taken) {
-            self.stars.replace(vertices[i], corner(t as u32, i), None);
+    pub fn prepare<M: MeshSink>(
+        &self,
+        [kept, removed]: [u32; 2],
+        brought: &[LeafTriangle],
+        step: usize,
+        mesh: &M,
+    ) {
+        if step == 0 {
+            self.vertex_of_leaf.prefetch(kept);
+            self.vertex_of_leaf.prefetch(removed);
+            return;
         }
-        self.triangles[t].number = NONE;
-        self.holes.push(t as u32);
-        self.displayed -= 1;
-        mesh.triangle_removed(t as u32);
+        // A vertex that is shown will be merged away, another will come back.
+        let (to, from) = (self.vertex_of_leaf.get(kept), self.vertex_of_leaf.get(removed));
+        if step == 1 {
+            self.stars.prefetch(to);
+            self.stars.prefetch(from);
+            if from == NONE {
+                brought.iter().for_each(|triangle| self.shown.prefetch(triangle.far_leaf()));
+            }
+            return;
+        }
+        for &corner in self.stars.corners(if from == NONE { to } else { from }) {
+            let (t, _) = triangle_of(corner);
+            prefetch(&self.triangles, t);
+            mesh.prefetch(t as u32);
+        }
+        if from == NONE {
+            brought.iter().for_each(|triangle| self.stars.prefetch(self.vertex_at(triangle.far_leaf())));
+        }
     }
 
     /// Gives up the last slot; what is in it moves into a hole.
@@ -211,7 +275,7 @@ impl StarMesh {
         while let Some(hole) = self.holes.pop() {
             if hole < last {
                 for (i, vertex) in triangle.vertices.into_iter().enumerate() {
-                    self.stars.replace(vertex, corner(last, i), Some(corner(hole, i)));
+                    self.stars.replace(vertex, corner(last, i), corner(hole, i));
                 }
                 self.triangles[hole as usize] = triangle;
                 mesh.triangle_removed(last);

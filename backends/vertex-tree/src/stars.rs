@@ -2,7 +2,7 @@
 //!
 //! Most vertices have about six. A star of up to 14 lies in one cache line; a larger one moves to a list of its own.
 
-use crate::NONE;
+use crate::{NONE, prefetch};
 
 /// Corner `c` of the triangle in slot `t` is numbered `4 t + c`: the triangle is found by a shift.
 pub(crate) type Corner = u32;
@@ -45,14 +45,15 @@ impl Stars {
     /// A vertex appears; returns its slot. Slots are used again last in, first out.
     #[inline]
     pub fn add(&mut self, leaf: u32) -> u32 {
-        let star = Star { leaf, count: 0, near: [NONE; NEAR] };
         match self.holes.pop() {
             Some(slot) => {
-                self.stars[slot as usize] = star;
+                let star = &mut self.stars[slot as usize];
+                star.leaf = leaf;
+                star.count = 0;
                 slot
             }
             None => {
-                self.stars.push(star);
+                self.stars.push(Star { leaf, count: 0, near: [NONE; NEAR] });
                 self.stars.len() as u32 - 1
             }
         }
@@ -75,6 +76,11 @@ impl Stars {
     #[inline(always)]
     pub fn leaf(&self, slot: u32) -> u32 {
         self.stars[slot as usize].leaf
+    }
+
+    #[inline(always)]
+    pub fn prefetch(&self, slot: u32) {
+        prefetch(&self.stars, slot as usize);
     }
 
     #[inline(always)]
@@ -117,47 +123,75 @@ impl Stars {
         self.far[star.near[0] as usize].push(corner);
     }
 
-    /// Replaces a corner that is in the star by another, or removes it.
-    #[inline(always)]
-    pub fn replace(&mut self, slot: u32, corner: Corner, by: Option<Corner>) {
-        let Some(at) = self.corners(slot).iter().position(|&c| c == corner) else { return };
+    /// Replaces a corner that is in the star by another.
+    pub fn replace(&mut self, slot: u32, corner: Corner, by: Corner) {
         let star = &mut self.stars[slot as usize];
-        if star.count == FAR {
-            let far = &mut self.far[star.near[0] as usize];
-            match by {
-                Some(by) => far[at] = by,
-                None => drop(far.swap_remove(at)),
-            }
-        } else if let Some(by) = by {
-            star.near[at] = by;
-        } else {
-            star.count -= 1;
-            star.near[at] = star.near[star.count as usize % NEAR];
+        let corners = match star.count {
+            FAR => &mut self.far[star.near[0] as usize][..],
+            count => &mut star.near[..(count as usize).min(NEAR)],
+        };
+        if let Some(place) = corners.iter_mut().find(|place| **place == corner) {
+            *place = by;
         }
     }
 
-    /// Moves the corners for which `moves` says so from one star to another.
+    /// Takes a corner out of a star; the last one takes its place.
+    #[inline(always)]
+    pub fn take(&mut self, slot: u32, corner: Corner) {
+        let star = &mut self.stars[slot as usize];
+        if star.count == FAR {
+            let far = &mut self.far[star.near[0] as usize];
+            if let Some(at) = far.iter().position(|&c| c == corner) {
+                far.swap_remove(at);
+            }
+            return;
+        }
+        // All places are compared, also unused ones: where a loop would end can not be predicted.
+        let mut found = 0;
+        for (at, &c) in star.near.iter().enumerate() {
+            found |= u32::from(c == corner) << at;
+        }
+        let used = (1 << star.count) - 1;
+        if found & used != 0 {
+            star.count -= 1;
+            star.near[found.trailing_zeros() as usize % NEAR] = star.near[star.count as usize % NEAR];
+        }
+    }
+
+    /// Moves the corners for which `moves` says so from one star to another, which is empty.
     #[inline(always)]
     pub fn split(&mut self, from: u32, to: u32, mut moves: impl FnMut(Corner) -> bool) {
+        let star = &mut self.stars[from as usize];
+        if star.count == FAR {
+            return self.split_far(from, to, moves);
+        }
+        let (corners, count) = (star.near, (star.count as usize).min(NEAR));
+        // Both lists are written whether a corner goes there or not: only their lengths depend on it.
+        let (mut stay, mut go, mut gone) = (0, 0, [NONE; NEAR]);
+        for &corner in &corners[..count] {
+            let moves = usize::from(moves(corner));
+            star.near[stay % NEAR] = corner;
+            gone[go % NEAR] = corner;
+            go += moves;
+            stay += 1 - moves;
+        }
+        star.count = stay as u32;
+        let star = &mut self.stars[to as usize];
+        star.near = gone;
+        star.count = go as u32;
+    }
+
+    #[cold]
+    fn split_far(&mut self, from: u32, to: u32, mut moves: impl FnMut(Corner) -> bool) {
+        let number = self.stars[from as usize].near[0] as usize;
         let mut at = 0;
-        while let Some(&corner) = self.corners(from).get(at) {
+        while let Some(&corner) = self.far[number].get(at) {
             if moves(corner) {
-                self.remove_at(from, at);
+                self.far[number].swap_remove(at);
                 self.push(to, corner);
             } else {
                 at += 1;
             }
-        }
-    }
-
-    #[inline(always)]
-    fn remove_at(&mut self, slot: u32, at: usize) {
-        let star = &mut self.stars[slot as usize];
-        if star.count == FAR {
-            self.far[star.near[0] as usize].swap_remove(at);
-        } else {
-            star.count -= 1;
-            star.near[at % NEAR] = star.near[star.count as usize % NEAR];
         }
     }
 

@@ -101,6 +101,10 @@ pub trait VertexTree {
     /// the engine a look at the children's own records.
     const IS_TREE: bool = false;
 
+    /// How many steps of [`prepare`](Self::prepare) there are: links of the longest chain of reads that a change of
+    /// status follows.
+    const PREPARATION: usize = 0;
+
     /// One more than the largest node number.
     fn node_limit(&self) -> u32;
     /// How many triangles are displayed now; known also where the sink does not keep the mesh.
@@ -127,10 +131,11 @@ pub trait VertexTree {
     /// Folds a collapsible node: the inverse of [`unfold`](Self::unfold).
     fn fold<M: MeshSink>(&mut self, node: NodeId, mesh: &mut M) -> Result<Step, TreeError>;
 
-    /// Says that these nodes are about to be folded or unfolded: a chance to fetch what that takes into the caches, for
-    /// all of them at once. Changes nothing.
-    fn prepare(&self, nodes: &[NodeId]) {
-        let _ = nodes;
+    /// Says that a boundary or a collapsible node is about to change its status: a chance to fetch what that takes into
+    /// the caches. Called for steps 0, 1 and so on below [`PREPARATION`](Self::PREPARATION), each when what the step
+    /// before has asked for has had the time to arrive. Changes nothing.
+    fn prepare<M: MeshSink>(&self, node: NodeId, step: usize, mesh: &M) {
+        let _ = (node, step, mesh);
     }
     /// Says that `node` can not be unfolded before `ticks` ticks of the engine's clock have passed: a prefetch hint.
     fn will_need(&mut self, node: NodeId, ticks: u32) {
