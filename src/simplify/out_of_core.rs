@@ -29,10 +29,13 @@
 //! Everything runs on the thread that calls.
 
 mod blocks;
+mod log;
+mod parts;
 mod passes;
 mod prepare;
 mod scratch;
 mod sort;
+mod store;
 mod window;
 
 use std::io;
@@ -46,7 +49,8 @@ use super::key_counts::KeyCounts;
 use super::{Options, Report};
 use crate::mesh_io::{MeshIoError, Receiver};
 use crate::progress::Progress;
-use passes::{FIRST_PARITY, Interrupted, Log, Passes};
+use log::Log;
+use passes::{FIRST_PARITY, Interrupted, Passes};
 use prepare::Input;
 use scratch::Scratch;
 use window::Whole;

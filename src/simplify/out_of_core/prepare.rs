@@ -111,7 +111,7 @@ pub(super) fn first_blocks(
             let [old, x, y, z] = vertex?;
             let mut record = [0; VERTEX_WORDS];
             record[..5].copy_from_slice(&[number, old, x, y, z]);
-            record[17..21].copy_from_slice(&[NONE, super::window::NO_CANDIDATE, NONE, NONE]);
+            record[17..21].copy_from_slice(&[NONE, super::store::NO_CANDIDATE, NONE, NONE]);
             words.vertices.extend(record);
         }
         blocks.write(block, words)?;
