@@ -195,9 +195,7 @@ pub fn build_within(
     let collapses = log.collapses.len();
     let counts = LogCounts { vertices, triangles, collapses };
     write(output, counts, &mut input, log, limits.stop).map_err(|error| match error {
-        LogFileError::Io { source, .. } if source.get_ref().is_some_and(|e| e.is::<Interrupted>()) => {
-            OutOfCoreError::Interrupted
-        }
+        LogFileError::Io { source, .. } if is_interruption(&source) => OutOfCoreError::Interrupted,
         error => error.into(),
     })?;
     progress(1000, 1000);
@@ -302,9 +300,14 @@ impl Receiver for Receiving<'_> {
 
 /// The error for temporary files in a folder, unless somebody wanted the construction to stop.
 fn temporary(folder: &Path, source: io::Error) -> OutOfCoreError {
-    if source.get_ref().is_some_and(|e| e.is::<Interrupted>()) {
+    if is_interruption(&source) {
         OutOfCoreError::Interrupted
     } else {
         OutOfCoreError::Temporary { folder: folder.to_owned(), source }
     }
+}
+
+/// Whether an error says that somebody wanted the construction to stop.
+fn is_interruption(error: &io::Error) -> bool {
+    matches!(error.get_ref(), Some(source) if source.is::<Interrupted>())
 }
