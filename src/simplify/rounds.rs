@@ -215,6 +215,11 @@ impl Builder {
             return;
         }
         let error = self.measure(v, u);
+        if !self.star.is_empty() && self.samples.nothing_new() {
+            // Where components are joined, the last triangles of one could go, with nothing near to take their place.
+            self.candidates.state[v as usize] = State::Nothing;
+            return;
+        }
         let key = (MEASURED_WEIGHT * error * error).min(f32::MAX).max(self.candidates.key[v as usize]);
         self.candidates.key[v as usize] = key;
         if key > limit {
