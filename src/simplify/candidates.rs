@@ -163,19 +163,6 @@ impl Candidates {
         self.state[i] = State::Updated(self.parity);
     }
 
-    /// Takes back what is known of candidates, where it may come of virtual edges that will not be there any more, or of
-    /// rounds other than those with the parity `now`.
-    pub fn forget_virtual_edges(&mut self, surface: &Surface, now: Parity) {
-        self.parity = now;
-        for &v in &surface.live {
-            let state = &mut self.state[v as usize];
-            let is_virtual = surface.virtual_edges.partners(v).next().is_some();
-            if is_virtual || matches!(state, State::Outdated(_) | State::Updated(_)) {
-                *state = State::Outdated(now.other());
-            }
-        }
-    }
-
     /// Counts the key of `v`, as it was when it was last looked at.
     pub fn count(&self, v: u32, counts: &mut KeyCounts) {
         if self.state[v as usize] != State::Nothing {

@@ -52,7 +52,7 @@ pub(super) struct Builder {
     /// Triangles that stand in where nothing takes the place of the star.
     others: Vec<u32>,
     /// Whether to join components.
-    pub merge: bool,
+    merge: bool,
     /// Length of a unit of the simplification in object units.
     scale: f64,
 }
@@ -354,7 +354,7 @@ impl Builder {
 
     /// Finds pairs for virtual edges among the vertices `live[range]`, as far apart as vertices are on average on a plane,
     /// times `reach`.
-    pub fn seek_virtual_edges(&mut self, reach: f32, range: Range<usize>) {
+    fn seek_virtual_edges(&mut self, reach: f32, range: Range<usize>) {
         let surface = &mut self.surface;
         let vertices = surface.live[range].to_vec();
         let positions = || vertices.iter().map(|&v| surface.position(v));
@@ -377,7 +377,7 @@ impl Builder {
 }
 
 /// Times the average distance of vertices: beyond this, no pair is left to be found.
-pub(super) const FARTHEST_REACH: f32 = 1e6;
+const FARTHEST_REACH: f32 = 1e6;
 
 /// Numbers of vertices in a block, of which between a half and all are there: blocks widen as vertices grow fewer.
 pub(super) fn block_width(all: usize, live: usize) -> u32 {

@@ -8,7 +8,7 @@ use vertex_tree::NONE;
 
 use super::super::candidates::Parity;
 use super::super::key_counts::KeyCounts;
-use super::super::rounds::{BLOCK, Builder, FARTHEST_REACH, block_width};
+use super::super::rounds::{BLOCK, Builder, block_width};
 use super::super::{leaf_radius, set_initial_quadric};
 use super::blocks::{Blocks, SPAN};
 use super::log::Log;
@@ -26,8 +26,6 @@ enum Work {
     Round(f32),
     /// Those without a legal edge are looked at again.
     Retry,
-    /// Virtual edges among them are sought, as far apart as in [`Builder::seek_virtual_edges`], and collapsed.
-    Merge(f32),
     /// Nothing is: those into which others have merged are counted.
     CountRoots,
 }
@@ -47,7 +45,7 @@ pub(super) struct Passes<'a> {
     pub all: usize,
     pub live: usize,
     pub counts: KeyCounts,
-    /// Whether to join components, where they do not fit in memory one window at a time.
+    /// Whether to join components, once all that is left fits in memory.
     pub merge_components: bool,
     /// Windows that have been loaded, and the vertices in them.
     pub windows: u64,
@@ -66,7 +64,7 @@ impl Passes<'_> {
 
     /// Collapses until nothing legal is left. `progress` is told the number of vertices that are left.
     pub fn run(&mut self, mut progress: impl FnMut(usize)) -> io::Result<()> {
-        let (mut hopeless_retried, mut reach) = (false, 1.0);
+        let mut hopeless_retried = false;
         while !self.fits() {
             progress(self.live);
             if let Some(limit) = self.counts.limit() {
@@ -81,12 +79,6 @@ impl Passes<'_> {
             } else if !hopeless_retried {
                 hopeless_retried = true;
                 self.sweep(Work::Retry)?;
-            } else if self.merge_components && reach < FARTHEST_REACH {
-                let before = self.live;
-                self.whole.first_id = self.whole.next_id;
-                self.sweep(Work::Merge(reach))?;
-                hopeless_retried = self.live == before;
-                reach *= 2.0;
             } else {
                 return self.sweep(Work::CountRoots);
             }
@@ -129,6 +121,10 @@ impl Passes<'_> {
     }
 
     fn sweep(&mut self, work: Work) -> io::Result<()> {
+        if !matches!(work, Work::Round(_)) {
+            // No round is under way, in which stars would have to look as they did before it.
+            self.whole.first_id = NONE;
+        }
         self.blocks.begin_pass(self.scratch.file()?);
         self.rings.clear();
         self.rings.resize(self.blocks.len(), Ring::Outside);
@@ -142,7 +138,7 @@ impl Passes<'_> {
             self.windows += 1;
             self.loaded += window.vertices() as u64;
             window.count(&mut self.counts, false);
-            self.work_on(&mut window, work)?;
+            self.work_on(&mut window, work);
             let builder = &window.builder;
             let nodes = window.loaded_nodes..builder.nodes.next();
             self.live -= nodes.len();
@@ -167,10 +163,7 @@ impl Passes<'_> {
         }
     }
 
-    fn work_on(&mut self, window: &mut Window, work: Work) -> io::Result<()> {
-        if let Work::Merge(reach) = work {
-            return self.merge(window, reach);
-        }
+    fn work_on(&mut self, window: &mut Window, work: Work) {
         let mut neighbours = Vec::new();
         let blocks: Vec<(u32, Range<usize>)> = window.inner().collect();
         let builder = &mut window.builder;
@@ -196,54 +189,9 @@ impl Passes<'_> {
                 }
                 Work::Round(limit) => builder.run_block(limit, self.whole.first_id, range),
                 Work::Retry => builder.retry_hopeless(range),
-                Work::Merge(_) => {}
                 Work::CountRoots => self.roots += range.filter(|&v| builder.nodes.top[v] != NONE).count(),
             }
         }
-        Ok(())
-    }
-
-    /// Joins components among the inner vertices of a window, in rounds of their own, until a half of them is left.
-    fn merge(&mut self, window: &mut Window, reach: f32) -> io::Result<()> {
-        let Some(inner) = window.inner_slots() else { return Ok(()) };
-        let numbers = window.numbers()[..window.vertices()].to_vec();
-        let builder = &mut window.builder;
-        builder.merge = true;
-        let range = |builder: &Builder| {
-            let live = &builder.surface.live;
-            live.partition_point(|&v| v < inner.start)..live.partition_point(|&v| v < inner.end)
-        };
-        let all = range(builder);
-        builder.seek_virtual_edges(reach, all.clone());
-        while range(builder).len() > all.len() / 2 {
-            check(self.stop)?;
-            let mut counts = KeyCounts::default();
-            let now = range(builder);
-            for &v in &builder.surface.live[now.clone()] {
-                builder.candidates.count(v, &mut counts);
-            }
-            let (Some(limit), first) = (counts.limit(), builder.nodes.next()) else { break };
-            builder.run_round(limit, self.all, |v| numbers[v as usize], now);
-            let nodes = first..builder.nodes.next();
-            if nodes.is_empty() {
-                // Keys have been brought up to date, or measured; when none is left to be, that was all.
-                let mut after = KeyCounts::default();
-                for &v in &builder.surface.live[range(builder)] {
-                    builder.candidates.count(v, &mut after);
-                }
-                if after.limit() == Some(limit) {
-                    break;
-                }
-                continue;
-            }
-            builder.surface.rebuild_stars();
-            let mut round = Sorter::new(&self.scratch, self.sort_bytes);
-            self.log.collect(builder, nodes, |v| window.originals[v as usize], &mut round)?;
-            self.log.end_round(round, limit)?;
-        }
-        builder.candidates.forget_virtual_edges(&builder.surface, self.whole.parity);
-        builder.merge = false;
-        Ok(())
     }
 
     /// The blocks of the window whose inner ones begin at `start`, and where those end: as many as there is memory for,

@@ -143,13 +143,6 @@ impl Window {
         self.blocks.iter().zip(ranges).filter(|((_, ring), _)| *ring == Ring::Inner).map(|(b, r)| (b.0, r))
     }
 
-    /// The slots of all vertices that come up.
-    pub fn inner_slots(&self) -> Option<std::ops::Range<u32>> {
-        let start = self.inner().next()?.1.start;
-        let end = self.inner().last()?.1.end;
-        Some(start as u32..end as u32)
-    }
-
     /// Numbers in the whole mesh of all vertices.
     pub fn numbers(&self) -> &[u32] {
         self.builder.samples.ids.as_deref().unwrap_or_default()
