@@ -29,12 +29,14 @@ mod off;
 mod ply;
 mod polygon;
 mod raster;
+mod receiver;
 mod stl;
 mod terrain;
 mod text;
 
 pub use error::{MeshIoError, Place};
 pub use ply::write_ply;
+pub use receiver::Receiver;
 
 use std::path::Path;
 
@@ -90,17 +92,8 @@ pub fn read_with(
     options: &ReadOptions,
     progress: Progress<'_>,
 ) -> Result<Mesh, MeshIoError> {
-    let inputs: Vec<&Path> = inputs.iter().map(AsRef::as_ref).collect();
-    let &first = inputs.first().ok_or(MeshIoError::NoInput)?;
-    for file in &inputs {
-        let extension = extension(file);
-        if !EXTENSIONS.contains(&&*extension) {
-            return Err(MeshIoError::UnknownExtension { file: file.to_path_buf(), extension });
-        }
-        if inputs.len() > 1 && !["hgt", "zip"].contains(&&*extension) {
-            return Err(MeshIoError::NotATile { file: file.to_path_buf() });
-        }
-    }
+    let inputs = check(inputs)?;
+    let first = inputs[0];
     let mesh = match &*extension(first) {
         "hgt" | "zip" => hgt::read(&inputs, progress)?,
         extension => {
@@ -119,6 +112,91 @@ pub fn read_with(
         return Err(MeshIoError::Empty { file: first.to_owned() });
     }
     Ok(mesh)
+}
+
+/// Reads as [`read_with`] does, but hands the mesh on piece by piece: `.ply`, `.obj`, `.hgt` and `.zip` take no memory to
+/// speak of, whatever their size; the other formats are in memory until they have been handed on. Temporary files are
+/// made in `folder`.
+///
+/// # Errors
+/// As [`read`], and [`MeshIoError::Receiver`].
+pub fn send(
+    inputs: &[impl AsRef<Path>],
+    options: &ReadOptions,
+    folder: &Path,
+    receiver: &mut dyn Receiver,
+    progress: Progress<'_>,
+) -> Result<(), MeshIoError> {
+    let files = check(inputs)?;
+    let mut counting = Counting { receiver, triangles: 0 };
+    match &*extension(files[0]) {
+        "hgt" | "zip" => hgt::send(&files, folder, &mut counting, progress)?,
+        "obj" => obj::send(files[0], &mut counting, progress)?,
+        "ply" => ply::send(files[0], &mut counting, progress)?,
+        _ => {
+            let mesh = read_with(inputs, options, progress)?;
+            mesh.positions.iter().try_for_each(|&p| counting.position(p)).map_err(MeshIoError::Receiver)?;
+            mesh.triangles.iter().try_for_each(|&t| counting.triangle(t)).map_err(MeshIoError::Receiver)?;
+        }
+    }
+    if counting.triangles == 0 { Err(MeshIoError::Empty { file: files[0].to_owned() }) } else { Ok(()) }
+}
+
+/// About how many triangles there are in files, by their lengths alone; 0 where that says nothing.
+#[must_use]
+pub fn expected_triangles(files: &[impl AsRef<Path>]) -> u64 {
+    let expected = |file: &Path| {
+        let bytes = std::fs::metadata(file).map_or(0, |m| m.len());
+        match &*extension(file) {
+            // Two bytes a sample, two triangles a cell; archived tiles are a half as large or less.
+            "hgt" => bytes,
+            "zip" => 2 * bytes,
+            // As text, and half as many as there are in a binary file.
+            "ply" | "obj" | "off" => bytes / 40,
+            "stl" => bytes / 50,
+            _ => 0,
+        }
+    };
+    files.iter().map(|file| expected(file.as_ref())).sum()
+}
+
+/// Counts the triangles on their way to another receiver.
+struct Counting<'a> {
+    receiver: &'a mut dyn Receiver,
+    triangles: u64,
+}
+
+impl Receiver for Counting<'_> {
+    fn position(&mut self, position: [f32; 3]) -> std::io::Result<()> {
+        self.receiver.position(position)
+    }
+
+    fn triangle(&mut self, corners: [u32; 3]) -> std::io::Result<()> {
+        self.triangles += 1;
+        self.receiver.triangle(corners)
+    }
+
+    fn position_of(&mut self, vertex: u32) -> std::io::Result<[f32; 3]> {
+        self.receiver.position_of(vertex)
+    }
+}
+
+/// Checks that there are inputs, that their formats are known, and that several are tiles.
+fn check(inputs: &[impl AsRef<Path>]) -> Result<Vec<&Path>, MeshIoError> {
+    let inputs: Vec<&Path> = inputs.iter().map(AsRef::as_ref).collect();
+    if inputs.is_empty() {
+        return Err(MeshIoError::NoInput);
+    }
+    for file in &inputs {
+        let extension = extension(file);
+        if !EXTENSIONS.contains(&&*extension) {
+            return Err(MeshIoError::UnknownExtension { file: file.to_path_buf(), extension });
+        }
+        if inputs.len() > 1 && !["hgt", "zip"].contains(&&*extension) {
+            return Err(MeshIoError::NotATile { file: file.to_path_buf() });
+        }
+    }
+    Ok(inputs)
 }
 
 /// The extension in lower case, empty if there is none.

@@ -142,7 +142,7 @@ impl Report {
             let rows: Vec<_> = std::iter::once(header).chain(table_rows(runs)).collect();
             let width = |column: usize| rows.iter().map(|r| r[column].chars().count()).max().unwrap_or(0);
             let widths: [usize; COLUMNS.len()] = std::array::from_fn(width);
-            let _ = writeln!(text, "\n{}, path {}", runs[0].scene, runs[0].path);
+            let _ = writeln!(text, "\n{}, {}, path {}", runs[0].scene, runs[0].backend, runs[0].path);
             for row in &rows {
                 for (at, (cell, width)) in row.iter().zip(widths).enumerate() {
                     let _ = if at == 0 {

@@ -3,9 +3,11 @@
 mod ball;
 mod candidates;
 mod faces;
+mod key_counts;
 mod legality;
 mod marks;
 mod nodes;
+mod out_of_core;
 mod quadric;
 mod rounds;
 mod samples;
@@ -13,14 +15,19 @@ mod spatial_order;
 mod surface;
 mod virtual_edges;
 
+use std::convert::Infallible;
+use std::ops::Range;
 use std::time::{Duration, Instant};
 
 use glam::{DVec3, Vec3};
 use vertex_tree::{Collapse, CollapseLog, LogError, Mesh};
 
 use crate::progress::Progress;
+pub use out_of_core::{LEAST_MEMORY, Limits, OutOfCoreError, build_within};
+
 use marks::Marks;
 use nodes::{Nodes, round_up};
+use quadric::Quadric;
 use rounds::Builder;
 use surface::Surface;
 
@@ -33,6 +40,29 @@ pub struct Options {
     pub merge_components: bool,
 }
 
+/// A round of independent collapses, which is a pass where the mesh is larger than memory.
+#[derive(Clone, Debug, Default, PartialEq)]
+#[non_exhaustive]
+pub struct Round {
+    /// The largest key that was taken up.
+    pub limit: f32,
+    /// Collapses made, and the keys of the first and of the last of them.
+    pub collapses: usize,
+    /// See [`collapses`](Self::collapses).
+    pub keys: [f32; 2],
+}
+
+impl Round {
+    /// Puts a collapse behind the others.
+    fn push(&mut self, key: f32) {
+        if self.collapses == 0 {
+            self.keys[0] = key;
+        }
+        self.keys[1] = key;
+        self.collapses += 1;
+    }
+}
+
 /// What a simplification did.
 #[derive(Clone, Debug, Default, PartialEq)]
 #[non_exhaustive]
@@ -41,8 +71,8 @@ pub struct Report {
     pub triangles: usize,
     /// Collapses made.
     pub collapses: usize,
-    /// Rounds of independent collapses.
-    pub rounds: usize,
+    /// Rounds of independent collapses, in order.
+    pub rounds: Vec<Round>,
     /// Roots of the forest.
     pub roots: usize,
     /// Depth of the forest.
@@ -55,6 +85,11 @@ pub struct Report {
     pub largest_eps: f32,
     /// Collapses whose key was less than that of an earlier one.
     pub inversions: usize,
+    /// Parts of the mesh that have been loaded, one after the other, and the vertices in them; 0 if the mesh was in memory
+    /// from the beginning.
+    pub windows: u64,
+    /// See [`windows`](Self::windows).
+    pub loaded: u64,
     /// Time to prepare: renumbering, quadrics.
     pub preparation: Duration,
     /// Time of the rounds.
@@ -89,18 +124,33 @@ pub fn build(mesh: Mesh, options: &Options, progress: Progress) -> Result<(Colla
     let leaf_radius = leaf_radii(mesh, &number);
     let mut surface = Surface::new(positions, &coherent_triangles(&mesh.triangles, &number));
     let mut marks = Marks::new(order.len());
-    set_initial_quadrics(&mut surface, &mut marks);
+    let mut neighbours = Vec::new();
+    for i in 0..surface.live.len() {
+        set_initial_quadric(surface.live[i], &mut surface, &mut marks, &mut neighbours);
+    }
     let nodes = Nodes::new(leaf_radius, extent);
     let mut builder = Builder::new(surface, nodes, marks, options.merge_components, scale);
+    builder.begin();
     let preparation = start.elapsed();
 
     let start = Instant::now();
-    builder.run(progress);
+    let all = builder.surface.live.len();
+    let mut rounds = Vec::new();
+    let run = builder.run(
+        all,
+        |v| v,
+        |builder, nodes, limit| {
+            rounds.push((nodes, limit));
+            progress((all - builder.surface.live.len()) as u64, all as u64);
+            Ok::<(), Infallible>(())
+        },
+    );
+    let Ok(()) = run;
     let simplification = start.elapsed();
 
     let start = Instant::now();
     let nodes = &builder.nodes;
-    let (sequence, inversions) = sequence(&nodes.keys, &builder.rounds);
+    let (sequence, rounds, inversions) = sequence(&nodes.keys, &rounds);
     let collapses = sequence.iter().map(|&node| {
         let c = nodes.collapses[node as usize];
         Collapse { removed: order[c.removed as usize], kept: order[c.kept as usize], ..c }
@@ -110,13 +160,15 @@ pub fn build(mesh: Mesh, options: &Options, progress: Progress) -> Result<(Colla
     let report = Report {
         triangles: log.mesh.triangles.len(),
         collapses: log.collapses.len(),
-        rounds: builder.rounds.len(),
+        rounds,
         roots: forest.roots().count(),
         tree_depth: forest.depth(),
         dependency_depth: nodes.depth.iter().copied().max().unwrap_or(0),
         base_triangles: builder.surface.live_triangles,
         largest_eps: log.collapses.iter().fold(0.0, |largest, c| c.bounds.eps.max(largest)),
         inversions,
+        windows: 0,
+        loaded: 0,
         preparation,
         simplification,
         conclusion: start.elapsed(),
@@ -124,23 +176,25 @@ pub fn build(mesh: Mesh, options: &Options, progress: Progress) -> Result<(Colla
     Ok((log, report))
 }
 
-/// The nodes of each round in ascending order of keys, and the number of those whose key is less than an earlier one's.
-fn sequence(keys: &[f32], rounds: &[u32]) -> (Vec<u32>, usize) {
+/// The nodes of each round in ascending order of keys, what the rounds did, and the number of nodes whose key is less
+/// than an earlier one's. The rounds are given by their nodes and limits.
+fn sequence(keys: &[f32], rounds: &[(Range<u32>, f32)]) -> (Vec<u32>, Vec<Round>, usize) {
     let mut sequence: Vec<u32> = (0..keys.len() as u32).collect();
-    let ends = rounds.iter().skip(1).copied().chain([keys.len() as u32]);
-    for (&start, end) in rounds.iter().zip(ends) {
-        sequence[start as usize..end as usize]
-            .sort_unstable_by(|&a, &b| keys[a as usize].total_cmp(&keys[b as usize]).then(a.cmp(&b)));
-    }
     let (mut highest, mut inversions) = (0.0, 0);
-    for &node in &sequence {
-        let key = keys[node as usize];
-        if key < highest {
-            inversions += 1;
+    let mut done = Vec::with_capacity(rounds.len());
+    for (nodes, limit) in rounds {
+        let nodes = &mut sequence[nodes.start as usize..nodes.end as usize];
+        nodes.sort_unstable_by(|&a, &b| keys[a as usize].total_cmp(&keys[b as usize]).then(a.cmp(&b)));
+        let mut round = Round { limit: *limit, ..Round::default() };
+        for &node in &*nodes {
+            let key = keys[node as usize];
+            round.push(key);
+            inversions += usize::from(key < highest);
+            highest = key.max(highest);
         }
-        highest = key.max(highest);
+        done.push(round);
     }
-    (sequence, inversions)
+    (sequence, done, inversions)
 }
 
 /// Weight of a plane that holds a boundary edge in place, per squared length of the edge.
@@ -158,7 +212,7 @@ fn power_of_two_above(x: f32) -> f64 {
 fn leaf_radii(mesh: &Mesh, number: &[u32]) -> Vec<f32> {
     let mut farthest = vec![0.0_f64; number.len()];
     let position = |v: u32| DVec3::from(mesh.positions[v as usize].map(f64::from));
-    for &[a, b, c] in &mesh.triangles {
+    for &[a, b, c] in mesh.triangles.iter().filter(|t| !is_flat(**t)) {
         for (v, w) in [(a, b), (b, c), (c, a)] {
             let squared = position(v).distance_squared(position(w));
             for v in [v, w] {
@@ -167,17 +221,22 @@ fn leaf_radii(mesh: &Mesh, number: &[u32]) -> Vec<f32> {
             }
         }
     }
-    farthest.into_iter().map(|squared| round_up(squared.sqrt() * (1.0 + 1e-15))).collect()
+    farthest.into_iter().map(leaf_radius).collect()
+}
+
+/// The radius of a leaf's sphere from the squared distance to the farthest corner of its triangles.
+fn leaf_radius(squared: f64) -> f32 {
+    round_up(squared.sqrt() * (1.0 + 1e-15))
+}
+
+/// Whether a triangle names a vertex twice, and so shows nothing.
+fn is_flat([a, b, c]: [u32; 3]) -> bool {
+    a == b || b == c || c == a
 }
 
 /// The triangles with three different corners in the new numbering, in the order of their lowest vertices.
 fn coherent_triangles(triangles: &[[u32; 3]], number: &[u32]) -> Vec<[u32; 3]> {
-    let renumbered = || {
-        triangles
-            .iter()
-            .map(|t| t.map(|v| number[v as usize]))
-            .filter(|&[a, b, c]| a != b && b != c && c != a)
-    };
+    let renumbered = || triangles.iter().map(|t| t.map(|v| number[v as usize])).filter(|t| !is_flat(*t));
     let lowest = |[a, b, c]: [u32; 3]| a.min(b).min(c) as usize;
     let mut place = vec![0_usize; number.len() + 1];
     for t in renumbered() {
@@ -195,27 +254,20 @@ fn coherent_triangles(triangles: &[[u32; 3]], number: &[u32]) -> Vec<[u32; 3]> {
     ordered
 }
 
-/// Gives each vertex the planes of the triangles around it, weighted by area, and at edges that do not join exactly
-/// two triangles a plane through the edge, upright on the triangle. Also finds which vertices have such edges.
-fn set_initial_quadrics(surface: &mut Surface, marks: &mut Marks) {
-    for i in 0..surface.triangles.len() {
-        let corners @ [a, b, c] = surface.triangles[i].corners;
+/// Gives `v` the planes of the triangles around it, weighted by area, and at edges that do not join exactly two triangles
+/// a plane through the edge, upright on the triangle. Also finds whether the vertex has such edges.
+fn set_initial_quadric(v: u32, surface: &mut Surface, marks: &mut Marks, neighbours: &mut Vec<(u32, u32)>) {
+    let mut quadric = Quadric::default();
+    for spoke in surface.spokes(v) {
+        let [a, b, c] = surface.triangles[spoke.triangle as usize].corners;
         let normal = surface.normal(a, b, c);
         let length = normal.length();
         if length > 0.0 {
-            for v in corners {
-                surface.quadrics[v as usize].add_plane(normal / length, 0.5 * length, 0.5 * length);
-            }
+            quadric.add_plane(normal / length, 0.5 * length, 0.5 * length);
         }
     }
-    let mut neighbours = Vec::new();
-    for i in 0..surface.live.len() {
-        let v = surface.live[i];
-        if surface.is_surrounded(v) {
-            continue;
-        }
-        surface.neighbours(v, marks, &mut neighbours);
-        let mut quadric = surface.quadrics[v as usize];
+    if !surface.is_surrounded(v) {
+        surface.neighbours(v, marks, neighbours);
         for &(w, _) in neighbours.iter().filter(|&&(_, triangles)| triangles != 2) {
             surface.special[v as usize] = true;
             let edge = surface.position(w) - surface.position(v);
@@ -225,6 +277,6 @@ fn set_initial_quadrics(surface: &mut Surface, marks: &mut Marks) {
                 quadric.add_plane(upright, weight, 0.0);
             }
         }
-        surface.quadrics[v as usize] = quadric;
     }
+    surface.quadrics[v as usize] = quadric;
 }

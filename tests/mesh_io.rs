@@ -12,8 +12,20 @@ use tempfile::TempDir;
 use tiff::encoder::{TiffEncoder, colortype};
 use tiff::tags::Tag;
 
+/// Reads at once, and piece by piece, which has to come to the same.
 fn read(inputs: &[impl AsRef<Path>]) -> Result<Mesh, MeshIoError> {
-    mesh_io::read(inputs, &mut |_, _| ())
+    let whole = mesh_io::read(inputs, &mut |_, _| ());
+    let mut pieces = Mesh::default();
+    let folder = std::env::temp_dir();
+    let sent =
+        mesh_io::send(inputs, &ReadOptions::default(), &folder, &mut pieces, &mut |_, _| ()).map(|()| pieces);
+    match (&whole, &sent) {
+        (Ok(whole), Ok(pieces)) => assert_eq!(whole, pieces),
+        // Of several errors, another may be met first.
+        (Err(_), Err(_)) => {}
+        _ => panic!("at once {whole:?}, piece by piece {sent:?}"),
+    }
+    whole
 }
 
 /// Reads `bytes` as a file of this name.

@@ -58,6 +58,12 @@ pub(super) struct Build {
     pub merge_components: bool,
     #[command(flatten)]
     pub storage: Storage,
+    /// Memory to build within, such as 256M, for meshes that are larger; the rest is kept in temporary files.
+    #[arg(long, value_name = "SIZE", value_parser = size)]
+    pub memory: Option<u64>,
+    /// Folder for temporary files [default: that of the output].
+    #[arg(long, value_name = "DIR", requires = "memory")]
+    pub temp: Option<PathBuf>,
 }
 
 /// How a backend arranges a hierarchy.
@@ -346,6 +352,23 @@ fn positive(text: &str) -> Result<f64, String> {
     }
 }
 
+/// A number of bytes, or of units of 2^10, 2^20 or 2^30 bytes with the letter K, M or G.
+fn size(text: &str) -> Result<u64, String> {
+    let expected = || "a size such as 256M, 1G or a number of bytes is expected".to_owned();
+    let (number, shift) = [('K', 10), ('M', 20), ('G', 30)]
+        .iter()
+        .find_map(|&(unit, shift)| Some((text.strip_suffix(unit)?, shift)))
+        .unwrap_or((text, 0));
+    if !number.bytes().all(|b| b.is_ascii_digit()) {
+        return Err(expected());
+    }
+    let number: u64 = number.parse().map_err(|_| expected())?;
+    match number.checked_mul(1 << shift) {
+        Some(bytes) if bytes > 0 => Ok(bytes),
+        _ => Err(expected()),
+    }
+}
+
 fn strategy(text: &str) -> Result<Strategy, String> {
     Strategy::ALL
         .into_iter()
@@ -385,16 +408,6 @@ fn cache(text: &str) -> Result<CacheMode, String> {
     CacheMode::ALL.into_iter().find(|mode| mode.name() == text).ok_or_else(names)
 }
 
-/// Bytes, or a number with the unit K, M or G of 1024 each.
-fn size(text: &str) -> Result<u64, String> {
-    let (number, shift) = [("K", 10), ("M", 20), ("G", 30)]
-        .iter()
-        .find_map(|&(unit, shift)| Some((text.strip_suffix(unit)?, shift)))
-        .unwrap_or((text, 0));
-    let bytes = number.parse::<u64>().ok().and_then(|n| n.checked_mul(1 << shift));
-    bytes.filter(|&n| n > 0).ok_or_else(|| "a size such as 65536, 64K, 256M or 1G is expected".to_owned())
-}
-
 /// A number of changes, or a time.
 fn work_cap(text: &str) -> Result<WorkCap, String> {
     let expected = |_| "a number of changes, or a time such as 200us, is expected".to_owned();
@@ -416,6 +429,11 @@ mod tests {
 
     #[test]
     fn values_are_read_as_documented() {
+        assert_eq!(size("4096"), Ok(4096));
+        assert_eq!((size("64K"), size("256M"), size("1G")), (Ok(64 << 10), Ok(256 << 20), Ok(1 << 30)));
+        for wrong in ["", "0", "M", "-1", "1.5G", "+3K", "1T", "99999999999G", "64k"] {
+            assert!(size(wrong).is_err(), "{wrong}");
+        }
         assert_eq!(frames("3..7"), Ok(3..7));
         assert_eq!(frames("..7"), Ok(0..7));
         assert!(frames("7..3").is_err());

@@ -1,6 +1,8 @@
 //! `build`, `info` and `verify`.
 
 use std::fmt::Write;
+use std::path::PathBuf;
+use std::sync::atomic::{AtomicBool, Ordering};
 
 use anyhow::{Context, Result};
 use serde_json::json;
@@ -10,12 +12,23 @@ use super::arguments::{Build, Info, Verify};
 use super::input::Input;
 use super::print;
 use super::progress::stage;
+use crate::mesh_io::{self, ReadOptions, Receiver};
+use crate::progress::Progress;
 use crate::simplify;
-use crate::store::{self, BuildOptions, Store};
+use crate::store::{self, Backend, BuildOptions, Store};
 
 pub(super) fn build(command: &Build) -> Result<()> {
     let input = Input::one(&command.input)?;
     super::check_writable(&command.output)?;
+    if let (Some(memory), Input::Meshes(files)) = (command.memory, &input) {
+        anyhow::ensure!(
+            command.backend == Backend::InMemory,
+            "--memory builds for in-memory as yet: files of {} are written from a log that is in memory",
+            command.backend.name()
+        );
+        let report = build_within(&input.name(), files, memory, command)?;
+        return print(&describe(&report));
+    }
     let (log, report) = input.log(command.merge_components)?;
     let options = BuildOptions::from(&command.storage);
     stage(&format!("{}: writing", input.name()), |_| {
@@ -27,6 +40,32 @@ pub(super) fn build(command: &Build) -> Result<()> {
     Ok(())
 }
 
+/// Builds the log of a mesh that may be larger than memory.
+fn build_within(name: &str, files: &[PathBuf], memory: u64, command: &Build) -> Result<simplify::Report> {
+    static STOP: AtomicBool = AtomicBool::new(false);
+    // Whoever does not want to wait for the temporary files to go asks twice.
+    ctrlc::set_handler(|| {
+        if STOP.swap(true, Ordering::Relaxed) {
+            std::process::exit(130);
+        }
+    })?;
+    let folder = match (&command.temp, command.output.parent()) {
+        (Some(folder), _) => folder.clone(),
+        (None, Some(parent)) if !parent.as_os_str().is_empty() => parent.to_owned(),
+        _ => PathBuf::from("."),
+    };
+    let options = simplify::Options { merge_components: command.merge_components };
+    let expected_triangles = mesh_io::expected_triangles(files);
+    let limits = simplify::Limits { memory, temporary: folder.clone(), expected_triangles, stop: &STOP };
+    let report = stage(&format!("{name}: building the hierarchy"), |p| {
+        let read = |receiver: &mut dyn Receiver, progress: Progress<'_>| {
+            mesh_io::send(files, &ReadOptions::default(), &folder, receiver, progress)
+        };
+        simplify::build_within(read, &command.output, &options, &limits, p)
+    })?;
+    Ok(report)
+}
+
 /// What a simplification did, in lines.
 fn describe(report: &simplify::Report) -> String {
     let time = report.preparation + report.simplification + report.conclusion;
@@ -36,7 +75,7 @@ fn describe(report: &simplify::Report) -> String {
          order inversions     {}\nmicroseconds a triangle  {:.2}\n",
         report.triangles,
         report.collapses,
-        report.rounds,
+        report.rounds.len(),
         report.roots,
         report.tree_depth,
         report.dependency_depth,

@@ -201,6 +201,9 @@ pub enum MeshIoError {
         /// The archive.
         file: PathBuf,
     },
+    /// Whoever takes the mesh piece by piece can not.
+    #[error("the mesh can not be kept: {0}")]
+    Receiver(#[source] std::io::Error),
     /// There is not one colour for each vertex.
     #[error("{}: {colours} colours for {vertices} vertices", file.display())]
     ColourCount {

@@ -13,7 +13,7 @@
 
 use std::ffi::OsStr;
 use std::fs::File;
-use std::io::{BufReader, Read};
+use std::io::{BufReader, Read, Seek, SeekFrom, Write};
 use std::ops::Range;
 use std::path::{Path, PathBuf};
 
@@ -22,7 +22,7 @@ use zip::result::ZipError;
 
 use super::input::Input;
 use super::terrain::{self, HeightGrid};
-use super::{MeshIoError, Place};
+use super::{MeshIoError, Place, Receiver};
 use crate::Mesh;
 use crate::progress::Progress;
 
@@ -44,8 +44,8 @@ struct Found {
     side: usize,
 }
 
-/// Reads `.hgt` files and `.zip` archives of them as one mosaic.
-pub(super) fn read(inputs: &[&Path], progress: Progress<'_>) -> Result<Mesh, MeshIoError> {
+/// The tiles of a mosaic from north to south, and from west to east in each band of one latitude.
+fn find(inputs: &[&Path], progress: Progress<'_>) -> Result<Vec<Found>, MeshIoError> {
     let mut found = Vec::new();
     for &input in inputs {
         if super::extension(input) == "zip" {
@@ -57,12 +57,44 @@ pub(super) fn read(inputs: &[&Path], progress: Progress<'_>) -> Result<Mesh, Mes
     }
     found.sort_by_key(|tile| (-tile.south, tile.west));
     check_mosaic(&found)?;
+    Ok(found)
+}
 
+/// Reads `.hgt` files and `.zip` archives of them as one mosaic.
+pub(super) fn read(inputs: &[&Path], progress: Progress<'_>) -> Result<Mesh, MeshIoError> {
+    let found = find(inputs, progress)?;
+    let mosaic = open_mosaic(&found, None, &mut *progress)?;
+    terrain::to_mesh(&mosaic, &found[0].path, progress)
+}
+
+/// As [`read`], but row by row. Tiles that are in archives are unpacked into temporary files in `folder`.
+pub(super) fn send(
+    inputs: &[&Path],
+    folder: &Path,
+    receiver: &mut dyn Receiver,
+    progress: Progress<'_>,
+) -> Result<(), MeshIoError> {
+    let found = find(inputs, progress)?;
+    let mosaic = open_mosaic(&found, Some(folder), &mut *progress)?;
+    terrain::send(&mosaic, &found[0].path, receiver, progress)
+}
+
+/// Reads all tiles, or unpacks them into a folder where one is given.
+fn open_mosaic(
+    found: &[Found],
+    folder: Option<&Path>,
+    progress: Progress<'_>,
+) -> Result<Mosaic, MeshIoError> {
     let mut tiles = Vec::with_capacity(found.len());
     let mut archive = None;
-    for tile in &found {
+    for tile in found {
+        let unpack = |reader: &mut dyn Read| match folder {
+            None => Ok(Samples::Here(read_samples(reader, tile)?)),
+            Some(folder) => Samples::unpack(reader, tile, folder),
+        };
         let samples = match &tile.archived {
-            None => read_samples(&mut Input::open(&tile.path, &mut *progress)?, tile)?,
+            None if folder.is_some() => Samples::open(tile)?,
+            None => unpack(&mut Input::open(&tile.path, &mut *progress)?)?,
             Some((path, number)) => {
                 // Usually all tiles are in one archive.
                 let (_, opened) = match archive.take() {
@@ -70,13 +102,12 @@ pub(super) fn read(inputs: &[&Path], progress: Progress<'_>) -> Result<Mesh, Mes
                     _ => archive.insert((path, open_archive(path)?)),
                 };
                 let mut entry = opened.by_index(*number).map_err(|e| archive_error(&tile.path, e))?;
-                read_samples(&mut entry, tile)?
+                unpack(&mut entry)?
             }
         };
         tiles.push(Tile { south: tile.south, west: tile.west, samples });
     }
-    let mosaic = Mosaic::new(tiles, found[0].side);
-    terrain::to_mesh(&mosaic, &found[0].path, progress)
+    Ok(Mosaic::new(tiles, found[0].side))
 }
 
 fn find_in_archive(path: &Path, found: &mut Vec<Found>) -> Result<(), MeshIoError> {
@@ -105,7 +136,7 @@ fn archive_error(path: &Path, error: ZipError) -> MeshIoError {
     MeshIoError::Decode { file: path.to_owned(), place: Place::Byte(0), source: error.into() }
 }
 
-fn read_samples(reader: &mut impl Read, tile: &Found) -> Result<Vec<i16>, MeshIoError> {
+fn read_samples(reader: &mut dyn Read, tile: &Found) -> Result<Vec<i16>, MeshIoError> {
     let expected = 2 * tile.side * tile.side;
     let mut bytes = Vec::with_capacity(expected + 1);
     // Reading past the end is what makes an archive compare its checksum.
@@ -173,8 +204,49 @@ fn south_west(name: &str) -> Option<(i32, i32)> {
 struct Tile {
     south: i32,
     west: i32,
-    /// Rows from north to south.
-    samples: Vec<i16>,
+    samples: Samples,
+}
+
+/// The samples of a tile, in rows from north to south.
+enum Samples {
+    /// In memory.
+    Here(Vec<i16>),
+    /// In a file, as many as there should be when it was opened.
+    File { path: PathBuf, file: File },
+}
+
+impl Samples {
+    fn open(tile: &Found) -> Result<Self, MeshIoError> {
+        let file = File::open(&tile.path).map_err(|e| super::input::open_error(&tile.path, e))?;
+        Ok(Self::File { path: tile.path.clone(), file })
+    }
+
+    /// Unpacks into a temporary file.
+    fn unpack(reader: &mut dyn Read, tile: &Found, folder: &Path) -> Result<Self, MeshIoError> {
+        let mut file = tempfile::tempfile_in(folder).map_err(MeshIoError::Receiver)?;
+        let bytes: Vec<u8> = read_samples(reader, tile)?.iter().flat_map(|s| s.to_be_bytes()).collect();
+        file.write_all(&bytes).map_err(MeshIoError::Receiver)?;
+        Ok(Self::File { path: tile.path.clone(), file })
+    }
+
+    /// Calls `take` with the samples of a row of `side`.
+    fn read_row(&self, row: usize, side: usize, mut take: impl FnMut(usize, i16)) -> Result<(), MeshIoError> {
+        match self {
+            Self::Here(samples) => {
+                samples[row * side..][..side].iter().enumerate().for_each(|(i, &s)| take(i, s));
+            }
+            Self::File { path, file } => {
+                let mut bytes = vec![0; 2 * side];
+                let start = 2 * (row * side) as u64;
+                let mut file = file;
+                let outcome = file.seek(SeekFrom::Start(start)).and_then(|_| file.read_exact(&mut bytes));
+                outcome.map_err(|e| super::input::read_error(path, Place::Byte(start), e))?;
+                let samples = bytes.chunks_exact(2).map(|b| i16::from_be_bytes([b[0], b[1]]));
+                samples.enumerate().for_each(|(i, s)| take(i, s));
+            }
+        }
+        Ok(())
+    }
 }
 
 /// Tiles of one resolution, seen as one grid.
@@ -233,7 +305,7 @@ impl HeightGrid for Mosaic {
         self.columns
     }
 
-    fn read_row(&self, row: usize, heights: &mut [f32]) {
+    fn read_row(&self, row: usize, heights: &mut [f32]) -> Result<(), MeshIoError> {
         heights.fill(f32::NAN);
         let side = self.cells + 1;
         let (band, within) = (row / self.cells, row % self.cells);
@@ -241,14 +313,15 @@ impl HeightGrid for Mosaic {
         let north = (within == 0 && band > 0).then(|| (band - 1, self.cells));
         for (band, row) in north.into_iter().chain([(band, within)]) {
             for tile in self.tiles_in_band(band) {
-                let samples = &tile.samples[row * side..][..side];
-                for (height, &sample) in heights[self.first_column(tile)..].iter_mut().zip(samples) {
-                    if height.is_nan() && sample != VOID {
-                        *height = f32::from(sample);
+                let heights = &mut heights[self.first_column(tile)..];
+                tile.samples.read_row(row, side, |column, sample| {
+                    if heights[column].is_nan() && sample != VOID {
+                        heights[column] = f32::from(sample);
                     }
-                }
+                })?;
             }
         }
+        Ok(())
     }
 
     fn cells(&self, row: usize) -> impl Iterator<Item = Range<usize>> {
@@ -297,18 +370,19 @@ mod tests {
     /// ```
     #[test]
     fn seams_have_one_owner_and_missing_tiles_are_holes() {
-        let samples = |tile: i16| (0..9).map(|i| 100 * tile + 10 * (i / 3) + i % 3).collect::<Vec<_>>();
-        let mut tiles = vec![
-            Tile { south: 1, west: 0, samples: samples(1) },
-            Tile { south: 1, west: 1, samples: samples(2) },
-            Tile { south: 0, west: 0, samples: samples(3) },
+        let samples = |tile: i16| (0..9).map(move |i| 100 * tile + 10 * (i / 3) + i % 3).collect::<Vec<_>>();
+        let mut with_void = samples(1);
+        with_void[7] = VOID;
+        let tiles = vec![
+            Tile { south: 1, west: 0, samples: Samples::Here(with_void) },
+            Tile { south: 1, west: 1, samples: Samples::Here(samples(2)) },
+            Tile { south: 0, west: 0, samples: Samples::Here(samples(3)) },
         ];
-        tiles[0].samples[7] = VOID;
         let mosaic = Mosaic::new(tiles, 3);
         let mut heights = [0.0; 5];
         let mut rows = Vec::new();
         for row in 0..mosaic.rows() {
-            mosaic.read_row(row, &mut heights);
+            mosaic.read_row(row, &mut heights).unwrap();
             rows.push(heights.map(|h| if h.is_nan() { -1 } else { h as i32 }));
         }
         assert_eq!(

@@ -3,11 +3,14 @@
 //! Vertices keep their order, faces may use vertices further down, and what is neither `v` nor `f` is skipped, and
 //! so are a vertex's weight or colour and a corner's texture and normal index.
 
+use std::path::Path;
+
 use super::input::Input;
-use super::polygon::Faces;
+use super::polygon::{FaceSender, Faces};
 use super::text::{Line, Lines};
-use super::{MeshIoError, Place};
+use super::{MAX_VERTICES, MeshIoError, Place, Receiver};
 use crate::Mesh;
+use crate::progress::Progress;
 
 pub(super) fn read(mut input: Input<'_>) -> Result<Mesh, MeshIoError> {
     let file = input.path;
@@ -27,6 +30,44 @@ pub(super) fn read(mut input: Input<'_>) -> Result<Mesh, MeshIoError> {
         }
     }
     faces.into_mesh(file, positions, 1)
+}
+
+/// As [`read`], but piece by piece: once through the file for the vertices, once for the faces.
+pub(super) fn send(
+    file: &Path,
+    receiver: &mut dyn Receiver,
+    progress: Progress<'_>,
+) -> Result<(), MeshIoError> {
+    let mut vertices = 0;
+    let mut input = Input::open(file, &mut *progress)?;
+    let mut lines = Lines::new(&mut input).with_comments('#').with_continuation();
+    while let Some(mut line) = lines.next()? {
+        if line.word() == Some("v") {
+            if vertices == MAX_VERTICES {
+                return Err(MeshIoError::TooManyVertices { file: file.to_owned() });
+            }
+            receiver.position(line.position()?).map_err(MeshIoError::Receiver)?;
+            vertices += 1;
+        }
+    }
+    let mut sender = FaceSender::new(receiver, vertices, file);
+    let mut input = Input::open(file, progress)?;
+    let mut lines = Lines::new(&mut input).with_comments('#').with_continuation();
+    let (mut so_far, mut corners) = (0, Vec::new());
+    while let Some(mut line) = lines.next()? {
+        match line.word() {
+            Some("v") => so_far += 1,
+            Some("f") => {
+                corners.clear();
+                while let Some(word) = line.word() {
+                    corners.push(vertex(&line, word, so_far)?);
+                }
+                sender.send(&corners, Place::Line(line.number), 1)?;
+            }
+            _ => {}
+        }
+    }
+    Ok(())
 }
 
 /// The vertex of a corner `v`, `v/vt`, `v//vn` or `v/vt/vn`, counted from 0. In the file it counts from 1, or from

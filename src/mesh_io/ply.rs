@@ -3,6 +3,7 @@
 //! Vertices are the properties `x y z` of the element `vertex`, faces the list `vertex_indices` or `vertex_index` of
 //! the element `face`, whatever their types and order; everything else is skipped.
 
+use std::cell::RefCell;
 use std::fs::File;
 use std::io::{self, BufRead, BufWriter, Read, Write};
 use std::path::Path;
@@ -12,8 +13,9 @@ use serde::de::MapAccess;
 use serde_ply::{DeserializeError, PlyFormat, PlyReader, RowVisitor};
 
 use super::input::Input;
-use super::polygon::Faces;
-use super::{MeshIoError, Place};
+use super::polygon::{FaceSender, Faces};
+use super::{MAX_VERTICES, MeshIoError, Place, Receiver};
+use crate::progress::Progress;
 use crate::{Mesh, output};
 
 #[derive(Deserialize)]
@@ -83,12 +85,7 @@ impl Contents {
     fn read_from(&mut self, reader: impl BufRead) -> Result<PlyFormat, DeserializeError> {
         let mut reader = PlyReader::from_reader(reader)?;
         let format = reader.header().format;
-        let mut elements = reader.header().elem_defs.iter();
-        if let Some(element) = elements.find(|e| e.properties.is_empty() && e.count > 0) {
-            // Its rows would take no bytes, and reading them all could take forever.
-            let message = format!("element {} has no properties", element.name);
-            return Err(io::Error::new(io::ErrorKind::InvalidData, message).into());
-        }
+        check_elements(&reader)?;
         while let Some(element) = reader.current_element() {
             match element.name.as_str() {
                 "vertex" => {
@@ -128,6 +125,145 @@ impl Contents {
         self.faces.end_face(face);
         self.face_count += 1;
         self.place = Some(Place::Face(self.face_count));
+    }
+}
+
+/// Refuses elements without properties: their rows would take no bytes, and reading them all could take forever.
+fn check_elements<R: BufRead>(reader: &PlyReader<R>) -> Result<(), DeserializeError> {
+    let mut elements = reader.header().elem_defs.iter();
+    match elements.find(|e| e.properties.is_empty() && e.count > 0) {
+        None => Ok(()),
+        Some(element) => {
+            let message = format!("element {} has no properties", element.name);
+            Err(io::Error::new(io::ErrorKind::InvalidData, message).into())
+        }
+    }
+}
+
+/// As [`read`], but piece by piece. Where faces come before the vertices, the file is read twice.
+pub(super) fn send(
+    file: &Path,
+    receiver: &mut dyn Receiver,
+    mut progress: Progress<'_>,
+) -> Result<(), MeshIoError> {
+    let mut vertices = 0;
+    let are_late = send_elements(file, receiver, &mut vertices, true, &mut progress)?;
+    if are_late {
+        send_elements(file, receiver, &mut vertices, false, &mut progress)?;
+    }
+    Ok(())
+}
+
+/// Reads the file once, and hands on vertices, if they are asked for, and those faces that come when there are vertices.
+/// Says whether there are others.
+fn send_elements(
+    path: &Path,
+    receiver: &mut dyn Receiver,
+    vertices: &mut usize,
+    with_vertices: bool,
+    progress: Progress<'_>,
+) -> Result<bool, MeshIoError> {
+    let mut input = Input::open(path, progress)?;
+    // What a row has led to: rows can not fail, so the file seems to end there.
+    let failed = RefCell::new(None);
+    let fail = |error| {
+        failed.borrow_mut().get_or_insert(error);
+    };
+    let mut are_late = false;
+    let mut place = None;
+    let mut line_end = &b"\n"[..];
+    let outcome = (|| -> Result<PlyFormat, DeserializeError> {
+        let reader = Stopping { reader: (&mut input).chain(&mut line_end), failed: &failed };
+        let mut reader = PlyReader::from_reader(reader)?;
+        let format = reader.header().format;
+        check_elements(&reader)?;
+        while let Some(element) = reader.current_element() {
+            match element.name.as_str() {
+                "vertex" if with_vertices => {
+                    place = Some(Place::Vertex(*vertices as u64));
+                    let rows = &mut RowVisitor::new(|Vertex { x, y, z }: Vertex| {
+                        let here = Place::Vertex(*vertices as u64);
+                        let wrong = [x, y, z].into_iter().find(|c| !c.is_finite());
+                        if failed.borrow().is_some() {
+                        } else if let Some(value) = wrong.map(f64::from) {
+                            fail(MeshIoError::NotFinite { file: path.to_owned(), place: here, value });
+                        } else if *vertices == MAX_VERTICES {
+                            fail(MeshIoError::TooManyVertices { file: path.to_owned() });
+                        } else if let Err(error) = receiver.position([x, y, z]) {
+                            fail(MeshIoError::Receiver(error));
+                        }
+                        *vertices += 1;
+                        place = Some(Place::Vertex(*vertices as u64));
+                    });
+                    (&mut reader).next_value_seed(rows)?;
+                }
+                "face" if *vertices > 0 => {
+                    place = Some(Place::Face(0));
+                    let mut sender = FaceSender::new(&mut *receiver, *vertices, path);
+                    let (mut number, mut corners) = (0, Vec::new());
+                    let rows = &mut RowVisitor::new(|Face { vertex_indices }: Face| {
+                        let here = Place::Face(number);
+                        number += 1;
+                        place = Some(Place::Face(number));
+                        corners.clear();
+                        corners.extend(vertex_indices.iter().filter_map(|&v| u32::try_from(v).ok()));
+                        if failed.borrow().is_some() {
+                        } else if let Some(&index) =
+                            vertex_indices.iter().find(|&&v| u32::try_from(v).is_err())
+                        {
+                            let vertices = sender.vertices;
+                            fail(MeshIoError::IndexOutOfRange {
+                                file: path.to_owned(),
+                                place: here,
+                                index,
+                                vertices,
+                            });
+                        } else if let Err(error) = sender.send(&corners, here, 0) {
+                            fail(error);
+                        }
+                    });
+                    (&mut reader).next_value_seed(rows)?;
+                }
+                name => {
+                    are_late |= name == "face";
+                    (&mut reader).next_value_seed(&mut RowVisitor::new(|_: Skipped| {}))?;
+                }
+            }
+            place = None;
+        }
+        Ok(format)
+    })();
+    if let Some(error) = failed.into_inner() {
+        return Err(error);
+    }
+    let place = place.unwrap_or(Place::Byte(input.position));
+    match outcome {
+        Ok(PlyFormat::Ascii) => Ok(are_late),
+        Ok(_) if line_end.is_empty() => Err(MeshIoError::Truncated { file: path.to_owned(), place }),
+        Ok(_) => Ok(are_late),
+        Err(DeserializeError(error)) => Err(input.io(place, error)),
+    }
+}
+
+/// A reader that ends when something else has gone wrong.
+struct Stopping<'f, R> {
+    reader: R,
+    failed: &'f RefCell<Option<MeshIoError>>,
+}
+
+impl<R: BufRead> Read for Stopping<'_, R> {
+    fn read(&mut self, buffer: &mut [u8]) -> io::Result<usize> {
+        if self.failed.borrow().is_some() { Ok(0) } else { self.reader.read(buffer) }
+    }
+}
+
+impl<R: BufRead> BufRead for Stopping<'_, R> {
+    fn fill_buf(&mut self) -> io::Result<&[u8]> {
+        if self.failed.borrow().is_some() { Ok(&[]) } else { self.reader.fill_buf() }
+    }
+
+    fn consume(&mut self, bytes: usize) {
+        self.reader.consume(bytes);
     }
 }
 

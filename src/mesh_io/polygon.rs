@@ -10,7 +10,7 @@ use std::path::Path;
 use earcut::Earcut;
 use earcut::utils3d::project3d_to_2d;
 
-use super::{MAX_VERTICES, MeshIoError, Place};
+use super::{MAX_VERTICES, MeshIoError, Place, Receiver};
 use crate::Mesh;
 
 /// Ear clipping is quadratic at worst.
@@ -59,7 +59,8 @@ impl Faces {
                 let index = i64::from(vertex) + first;
                 return Err(MeshIoError::IndexOutOfRange { file: file(), place, index, vertices });
             }
-            triangulator.triangulate(corners, &positions, &mut triangles);
+            let push = &mut |t: [u32; 3]| push_triangle(&mut triangles, t);
+            triangulator.triangulate(corners, |i| positions[corners[i] as usize], push);
         }
         Ok(Mesh { positions, triangles })
     }
@@ -69,6 +70,48 @@ impl Faces {
 pub(super) fn push_triangle(triangles: &mut Vec<[u32; 3]>, [a, b, c]: [u32; 3]) {
     if a != b && b != c && c != a {
         triangles.push([a, b, c]);
+    }
+}
+
+/// Triangulates faces as they come, for a receiver that has all their vertices.
+pub(super) struct FaceSender<'a> {
+    pub receiver: &'a mut dyn Receiver,
+    /// How many it has.
+    pub vertices: usize,
+    pub file: &'a Path,
+    triangulator: Triangulator,
+    points: Vec<[f32; 3]>,
+}
+
+impl<'a> FaceSender<'a> {
+    pub fn new(receiver: &'a mut dyn Receiver, vertices: usize, file: &'a Path) -> Self {
+        Self { receiver, vertices, file, triangulator: Triangulator::default(), points: Vec::new() }
+    }
+
+    /// `first` is the number of the first vertex in the file, for the error.
+    pub fn send(&mut self, corners: &[u32], place: Place, first: i64) -> Result<(), MeshIoError> {
+        let file = || self.file.to_owned();
+        if corners.len() > MAX_CORNERS {
+            return Err(MeshIoError::TooManyCorners { file: file(), place, corners: corners.len() });
+        }
+        if let Some(&vertex) = corners.iter().find(|&&v| v as usize >= self.vertices) {
+            let index = i64::from(vertex) + first;
+            return Err(MeshIoError::IndexOutOfRange { file: file(), place, index, vertices: self.vertices });
+        }
+        self.points.clear();
+        if corners.len() > 3 {
+            for &v in corners {
+                self.points.push(self.receiver.position_of(v).map_err(MeshIoError::Receiver)?);
+            }
+        }
+        let (receiver, points) = (&mut *self.receiver, &self.points);
+        let mut outcome = Ok(());
+        self.triangulator.triangulate(corners, |i| points[i], &mut |[a, b, c]| {
+            if a != b && b != c && c != a && outcome.is_ok() {
+                outcome = receiver.triangle([a, b, c]);
+            }
+        });
+        outcome.map_err(MeshIoError::Receiver)
     }
 }
 
@@ -82,22 +125,29 @@ struct Triangulator {
 }
 
 impl Triangulator {
-    fn triangulate(&mut self, corners: &[u32], positions: &[[f32; 3]], triangles: &mut Vec<[u32; 3]>) {
+    /// Calls `push` with triangles, some of which may name a vertex twice. `position` gives that of a corner by its
+    /// place in the list.
+    fn triangulate(
+        &mut self,
+        corners: &[u32],
+        position: impl Fn(usize) -> [f32; 3],
+        push: &mut dyn FnMut([u32; 3]),
+    ) {
         if let &[a, b, c] = corners {
-            return push_triangle(triangles, [a, b, c]);
+            return push([a, b, c]);
         }
         if corners.len() < 3 {
             return;
         }
         // Relative to the first corner, or a small face far from the origin would drown in rounding.
-        let origin = positions[corners[0] as usize].map(f64::from);
+        let origin = position(0).map(f64::from);
         self.ring.clear();
-        self.ring.extend(corners.iter().map(|&v| {
-            let p = positions[v as usize].map(f64::from);
+        self.ring.extend((0..corners.len()).map(|i| {
+            let p = position(i).map(f64::from);
             [p[0] - origin[0], p[1] - origin[1], p[2] - origin[2]]
         }));
         let flat = project3d_to_2d(&self.ring, self.ring.len(), &mut self.plane);
-        let mut push = |local: [usize; 3]| push_triangle(triangles, local.map(|i| corners[i]));
+        let mut push = |local: [usize; 3]| push(local.map(|i| corners[i]));
         if flat && !self.fan_fits() && self.clip_ears() {
             for ear in self.ears.chunks_exact(3) {
                 push([ear[0] as usize, ear[1] as usize, ear[2] as usize]);
@@ -137,7 +187,8 @@ mod tests {
         let positions: Vec<_> = points.iter().map(|p| [p[0], p[1], 5.0]).collect();
         let corners: Vec<_> = (0..points.len() as u32).collect();
         let mut triangles = Vec::new();
-        Triangulator::default().triangulate(&corners, &positions, &mut triangles);
+        let push = &mut |t: [u32; 3]| push_triangle(&mut triangles, t);
+        Triangulator::default().triangulate(&corners, |i| positions[i], push);
         let area = |t: &[u32; 3]| {
             let [a, b, c] = t.map(|v| points[v as usize].map(f64::from));
             signed_area(a, b, c) / 2.0

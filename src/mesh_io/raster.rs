@@ -74,10 +74,11 @@ impl HeightGrid for Raster {
         self.columns
     }
 
-    fn read_row(&self, row: usize, heights: &mut [f32]) {
+    fn read_row(&self, row: usize, heights: &mut [f32]) -> Result<(), MeshIoError> {
         for (height, &sample) in heights.iter_mut().zip(&self.samples[row * self.columns..]) {
             *height = (f64::from(sample) * self.vertical + self.offset) as f32;
         }
+        Ok(())
     }
 
     fn cells(&self, _row: usize) -> impl Iterator<Item = Range<usize>> {

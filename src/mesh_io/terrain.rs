@@ -8,7 +8,7 @@
 use std::ops::Range;
 use std::path::Path;
 
-use super::{MAX_VERTICES, MeshIoError, Place};
+use super::{MAX_VERTICES, MeshIoError, Place, Receiver};
 use crate::Mesh;
 use crate::progress::Progress;
 
@@ -17,7 +17,10 @@ pub(super) trait HeightGrid {
     fn rows(&self) -> usize;
     fn columns(&self) -> usize;
     /// Sets `heights`, one for each column, to row `row`, with NaN where there is none.
-    fn read_row(&self, row: usize, heights: &mut [f32]);
+    ///
+    /// # Errors
+    /// Where rows are read only now, whatever is wrong with the file.
+    fn read_row(&self, row: usize, heights: &mut [f32]) -> Result<(), MeshIoError>;
     /// The cells between rows `row` and `row + 1`; cell `c` is between columns `c` and `c + 1`.
     fn cells(&self, row: usize) -> impl Iterator<Item = Range<usize>>;
     /// Object space position of a sample.
@@ -43,6 +46,19 @@ pub(super) fn to_mesh(
         positions: Vec::with_capacity(cells + rows + columns),
         triangles: Vec::with_capacity(2 * cells),
     };
+    send(grid, file, &mut mesh, progress)?;
+    Ok(mesh)
+}
+
+/// Triangulates a grid read from `file`, piece by piece.
+pub(super) fn send(
+    grid: &impl HeightGrid,
+    file: &Path,
+    receiver: &mut dyn Receiver,
+    progress: Progress<'_>,
+) -> Result<(), MeshIoError> {
+    let (rows, columns) = (grid.rows(), grid.columns());
+    let mut sent = 0;
     let mut heights = vec![f32::NAN; columns];
     let mut heights_south = heights.clone();
     // Whether a triangle uses a sample of this row, and of the next.
@@ -56,10 +72,10 @@ pub(super) fn to_mesh(
     let mut strip_north: Vec<[Corner; 3]> = Vec::new();
     let mut strip = strip_north.clone();
 
-    grid.read_row(0, &mut heights);
+    grid.read_row(0, &mut heights)?;
     for row in 0..rows {
         if row + 1 < rows {
-            grid.read_row(row + 1, &mut heights_south);
+            grid.read_row(row + 1, &mut heights_south)?;
             for column in grid.cells(row).flatten() {
                 split_cell(&heights, &heights_south, column, &mut strip);
             }
@@ -74,15 +90,17 @@ pub(super) fn to_mesh(
                 let place = Place::Sample { row, column };
                 return Err(MeshIoError::NotFinite { file: file.to_owned(), place, value: f64::from(bad) });
             }
-            if mesh.positions.len() == MAX_VERTICES {
+            if sent == MAX_VERTICES {
                 return Err(MeshIoError::TooManyVertices { file: file.to_owned() });
             }
-            vertices[column] = mesh.positions.len() as u32;
-            mesh.positions.push(position);
+            vertices[column] = sent as u32;
+            sent += 1;
+            receiver.position(position).map_err(MeshIoError::Receiver)?;
         }
-        mesh.triangles.extend(strip_north.iter().map(|triangle| {
-            triangle.map(|c| if c.south { vertices[c.column] } else { vertices_north[c.column] })
-        }));
+        for triangle in &strip_north {
+            let vertex = |c: Corner| if c.south { vertices[c.column] } else { vertices_north[c.column] };
+            receiver.triangle(triangle.map(vertex)).map_err(MeshIoError::Receiver)?;
+        }
 
         std::mem::swap(&mut heights, &mut heights_south);
         std::mem::swap(&mut used, &mut used_south);
@@ -92,7 +110,7 @@ pub(super) fn to_mesh(
         strip.clear();
         progress(row as u64 + 1, rows as u64);
     }
-    Ok(mesh)
+    Ok(())
 }
 
 /// Appends the triangles of the cell to the right of `column`, counter-clockwise seen from above.
@@ -124,10 +142,11 @@ mod tests {
         fn columns(&self) -> usize {
             self.0[0].len()
         }
-        fn read_row(&self, row: usize, heights: &mut [f32]) {
+        fn read_row(&self, row: usize, heights: &mut [f32]) -> Result<(), MeshIoError> {
             for (height, digit) in heights.iter_mut().zip(self.0[row].chars()) {
                 *height = digit.to_digit(10).map_or(f32::NAN, |d| d as f32);
             }
+            Ok(())
         }
         fn cells(&self, _: usize) -> impl Iterator<Item = Range<usize>> {
             std::iter::once(0..self.columns() - 1)

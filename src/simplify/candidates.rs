@@ -4,12 +4,14 @@
 //! for, plus a little of the squared length of the edge. The second term decides where the first is zero, on plane
 //! ground and among doubled vertices: short edges first keeps triangles well-shaped and trees shallow.
 //!
-//! Keys are kept from round to round. Whether a collapse is legal costs more to say, and is asked when its turn comes:
+//! Keys are kept from round to round, and brought up to date when a vertex is visited, if its star has changed in the
+//! round before: what one block of vertices does never waits for what others will do. Whether a collapse is legal costs more to say, and is asked when its turn comes:
 //! most candidates are overtaken by a change nearby before that.
 
 use glam::Vec3;
 use vertex_tree::NONE;
 
+use super::key_counts::KeyCounts;
 use super::marks::Marks;
 use super::quadric::Quadric;
 use super::surface::Surface;
@@ -17,13 +19,27 @@ use super::surface::Surface;
 /// Part of the squared length of an edge that is added to the squared distance.
 const LENGTH_TERM: f32 = 1e-4;
 
+/// Whether a round has an even or an odd number. Every vertex that is left is visited in every round, so this tells
+/// the current round from the one before.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum Parity {
+    Even,
+    Odd,
+}
+
+impl Parity {
+    pub fn other(self) -> Parity {
+        if self == Parity::Even { Parity::Odd } else { Parity::Even }
+    }
+}
+
 /// What is known of a vertex's candidate.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum State {
-    /// The star has changed in this round: to be found anew.
-    Outdated,
-    /// The star has changed in this round, but the cheapest edge is known.
-    Updated,
+    /// The star has changed in the round: to be found anew when the vertex is visited in the next.
+    Outdated(Parity),
+    /// The star has changed in the round, but the cheapest edge is known.
+    Updated(Parity),
     /// The cheapest edge, legal or not.
     Cheapest,
     /// The cheapest edge that was legal when last asked.
@@ -40,6 +56,8 @@ pub(super) struct Candidates {
     pub key: Vec<f32>,
     pub target: Vec<u32>,
     pub state: Vec<State>,
+    /// That of the current round.
+    pub parity: Parity,
     /// The neighbours of one vertex, and the number of triangles at the edge to each.
     neighbours: Vec<(u32, u32)>,
     /// Edges of one vertex with their keys.
@@ -51,13 +69,23 @@ impl Candidates {
         Candidates {
             key: vec![0.0; count],
             target: vec![NONE; count],
-            state: vec![State::Outdated; count],
+            state: vec![State::Outdated(Parity::Odd); count],
+            parity: Parity::Even,
             neighbours: Vec::new(),
             edges: Vec::new(),
         }
     }
 
-    /// Finds the cheapest edge of `v` for the next round.
+    /// Brings the candidate of `v` up to date with what changed before the current round.
+    pub fn visit(&mut self, v: u32, surface: &mut Surface, marks: &mut Marks) {
+        match self.state[v as usize] {
+            State::Outdated(parity) if parity != self.parity => self.refresh(v, surface, marks),
+            State::Updated(parity) if parity != self.parity => self.state[v as usize] = State::Cheapest,
+            _ => {}
+        }
+    }
+
+    /// Finds the cheapest edge of `v`.
     pub fn refresh(&mut self, v: u32, surface: &mut Surface, marks: &mut Marks) {
         if surface.special[v as usize] {
             self.find_edges(v, surface, marks);
@@ -124,15 +152,22 @@ impl Candidates {
     /// Brings the candidate of `w` up to date after its neighbour `lost` has merged into `gained`.
     pub fn neighbour_merged(&mut self, w: u32, lost: u32, gained: u32, surface: &Surface) {
         let i = w as usize;
-        let known = matches!(self.state[i], State::Cheapest | State::Updated);
+        let known = matches!(self.state[i], State::Cheapest | State::Updated(_));
         if !known || surface.special[i] || self.target[i] == lost {
-            self.state[i] = State::Outdated;
+            self.state[i] = State::Outdated(self.parity);
             return;
         }
         // The other edges of `w` are what they were.
         let key = edge_key(&surface.quadrics[i], surface.position(gained) - surface.position(w));
         (self.key[i], self.target[i]) = cheaper((self.key[i], self.target[i]), (key, gained));
-        self.state[i] = State::Updated;
+        self.state[i] = State::Updated(self.parity);
+    }
+
+    /// Counts the key of `v`, as it was when it was last looked at.
+    pub fn count(&self, v: u32, counts: &mut KeyCounts) {
+        if self.state[v as usize] != State::Nothing {
+            counts.add(self.key[v as usize]);
+        }
     }
 
     fn set(&mut self, v: u32, candidate: Option<(f32, u32)>, state: State) {
@@ -142,13 +177,14 @@ impl Candidates {
     }
 }
 
+/// Keys are finite; infinity stands for no edge.
 fn edge_key(quadric: &Quadric, d: Vec3) -> f32 {
-    quadric.error(d) + LENGTH_TERM * d.length_squared()
+    (quadric.error(d) + LENGTH_TERM * d.length_squared()).min(f32::MAX)
 }
 
 /// Joining what is apart shows surface where there was none: the distance itself is an error.
 fn virtual_key(quadric: &Quadric, d: Vec3) -> f32 {
-    quadric.error(d) + d.length_squared()
+    (quadric.error(d) + d.length_squared()).min(f32::MAX)
 }
 
 /// The edge with the lower key, or with the lower vertex number if keys are equal.

@@ -39,6 +39,12 @@ pub(super) struct Nodes {
     pub collapses: Vec<Collapse>,
     /// For each node, the key of its collapse.
     pub keys: Vec<f32>,
+    /// For each node, its number in the whole construction, where only some are here, in any order.
+    pub ids: Option<Vec<u32>>,
+    /// The number in the whole construction that the next node gets.
+    pub next_id: u32,
+    /// For each node, the number of edges on the longest way down to a leaf.
+    pub height: Vec<u32>,
     /// For each node, the length of the longest chain of predecessors down to the input, counting itself.
     pub depth: Vec<u32>,
     /// For each vertex, the node at which it now stands, or `NONE`.
@@ -46,7 +52,7 @@ pub(super) struct Nodes {
     /// For each vertex, the node that last took a triangle from it and gave none, or `NONE`.
     pub trace: Vec<u32>,
     /// For each vertex, the distance to the farthest corner of its input triangles.
-    leaf_radius: Vec<f32>,
+    pub leaf_radius: Vec<f32>,
     slack: f64,
     predecessors: Vec<u32>,
     balls: Vec<Ball>,
@@ -58,6 +64,9 @@ impl Nodes {
         Nodes {
             collapses: Vec::with_capacity(leaf_radius.len()),
             keys: Vec::with_capacity(leaf_radius.len()),
+            ids: None,
+            next_id: 0,
+            height: Vec::with_capacity(leaf_radius.len()),
             depth: Vec::with_capacity(leaf_radius.len()),
             top: vec![NONE; leaf_radius.len()],
             trace: vec![NONE; leaf_radius.len()],
@@ -73,9 +82,19 @@ impl Nodes {
         self.collapses.len() as u32
     }
 
-    /// Makes the node of a collapse, unless its sphere is too large for single precision, and says whether it has. `creators` are the collapses that last changed the triangles around `removed`,
-    /// `NONE` for untouched ones; `bereaved` are the vertices that lose a triangle and get none; `positions` are those of
-    /// the two vertices.
+    /// The number of a node in the whole construction.
+    pub fn id(&self, node: u32) -> u32 {
+        self.ids.as_ref().map_or(node, |ids| ids[node as usize])
+    }
+
+    /// Whether `node` is one of the round whose first node has the number `first` in the whole construction.
+    pub fn is_from(&self, node: u32, first: u32) -> bool {
+        node != NONE && self.id(node) >= first
+    }
+
+    /// Makes the node of a collapse, unless its sphere is too large for single precision, and says whether it has.
+    /// `creators` are the collapses that last changed the triangles around `removed`, `NONE` for untouched ones;
+    /// `bereaved` are the vertices that lose a triangle and get none; `positions` are those of the two vertices.
     pub fn add(
         &mut self,
         [removed, kept]: [u32; 2],
@@ -87,18 +106,25 @@ impl Nodes {
     ) -> bool {
         self.predecessors.clear();
         self.balls.clear();
+        let mut height = 0;
         for (v, center) in [removed, kept].into_iter().zip(positions) {
             match self.top[v as usize] {
-                NONE => {
-                    self.balls.push(Ball { center, radius: f64::from(self.leaf_radius[v as usize]) });
+                NONE => self.balls.push(Ball { center, radius: f64::from(self.leaf_radius[v as usize]) }),
+                node => {
+                    height = self.height[node as usize].max(height);
+                    self.predecessors.push(node);
                 }
-                node => self.predecessors.push(node),
             }
         }
         let traces = bereaved.iter().chain([&removed]).map(|&v| self.trace[v as usize]);
         self.predecessors.extend(creators.chain(traces).filter(|&node| node != NONE));
-        self.predecessors.sort_unstable();
-        self.predecessors.dedup();
+        if let Some(ids) = &self.ids {
+            self.predecessors.sort_unstable_by_key(|&node| ids[node as usize]);
+            self.predecessors.dedup_by_key(|node| ids[*node as usize]);
+        } else {
+            self.predecessors.sort_unstable();
+            self.predecessors.dedup();
+        }
         let (mut eps, mut depth) = (error, 0);
         for &node in &self.predecessors {
             let b = self.collapses[node as usize].bounds;
@@ -121,6 +147,11 @@ impl Nodes {
             kept,
             bounds: Bounds { center: center.to_array(), radius, eps },
         });
+        if let Some(ids) = &mut self.ids {
+            ids.push(self.next_id);
+        }
+        self.next_id += 1;
+        self.height.push(height + 1);
         self.depth.push(depth + 1);
         self.keys.push(key);
         true

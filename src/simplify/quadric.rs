@@ -60,4 +60,22 @@ impl Quadric {
         self.c += other.c + d.dot(ad + 2.0 * other.b);
         self.area += other.area;
     }
+
+    /// As numbers, to be put away.
+    pub fn to_array(self) -> [f32; 11] {
+        let ([a, b, c], [d, e, f], [g, h, i]) =
+            (self.diagonal.to_array(), self.off_diagonal.to_array(), self.b.to_array());
+        [a, b, c, d, e, f, g, h, i, self.c, self.area]
+    }
+
+    /// What [`to_array`](Self::to_array) has put away.
+    pub fn from_array([a, b, c, d, e, f, g, h, i, j, area]: [f32; 11]) -> Quadric {
+        Quadric {
+            diagonal: Vec3::new(a, b, c),
+            off_diagonal: Vec3::new(d, e, f),
+            b: Vec3::new(g, h, i),
+            c: j,
+            area,
+        }
+    }
 }

@@ -13,36 +13,38 @@
 //! caches, and borders between them are few. The result is sorted by key afterwards: collapses of a round may be put
 //! in any order.
 
+use std::ops::Range;
+
 use vertex_tree::NONE;
 
 use super::candidates::{Candidates, State};
+use super::key_counts::KeyCounts;
 use super::legality::is_legal;
 use super::marks::Marks;
 use super::nodes::{Nodes, round_up};
 use super::samples::Samples;
 use super::surface::{Spoke, Surface};
-use crate::progress::Progress;
 
-/// Vertices of a block.
-const BLOCK: usize = 2048;
+/// Vertices of a block at the start.
+pub(super) const BLOCK: usize = 2048;
 /// How a measured distance counts against keys that are not measured: with this times its square. Keys are mean squared
 /// distances, less than the square of the largest. With 1, only the worst surprises are put off, at the cost of 7 %
 /// more measurements, and cuts of scans have 15 % fewer triangles than without measuring first; with 2 it is 50 % and
 /// 25 %, with 4 150 % and 26 %.
 const MEASURED_WEIGHT: f32 = 2.0;
-/// Candidates that a round takes up at least, if there are as many.
-const LEAST: usize = 16;
 
 /// Everything that changes while a mesh is being simplified.
 #[derive(Debug)]
 pub(super) struct Builder {
     pub surface: Surface,
     pub nodes: Nodes,
-    /// Number of the first node of each round.
-    pub rounds: Vec<u32>,
-    candidates: Candidates,
-    samples: Samples,
-    marks: Marks,
+    pub candidates: Candidates,
+    pub samples: Samples,
+    pub marks: Marks,
+    /// Vertices whose stars or samples have changed, if somebody wants to know.
+    pub touched: Option<Vec<u32>>,
+    /// The candidates of a block in the order in which they come up.
+    order: Vec<u64>,
     /// The star of the vertex in question.
     star: Vec<Spoke>,
     /// Vertices that lose a triangle and get none of the new ones.
@@ -57,14 +59,15 @@ pub(super) struct Builder {
 
 impl Builder {
     pub fn new(surface: Surface, nodes: Nodes, marks: Marks, merge: bool, scale: f64) -> Builder {
-        let count = surface.positions.len();
+        let (points, count) = (surface.positions.len(), surface.merged_into.len());
         Builder {
             surface,
             nodes,
-            rounds: Vec::new(),
             candidates: Candidates::new(count),
-            samples: Samples::new(count),
+            samples: Samples::new(points),
             marks,
+            touched: None,
+            order: Vec::new(),
             star: Vec::new(),
             bereaved: Vec::new(),
             others: Vec::new(),
@@ -73,89 +76,95 @@ impl Builder {
         }
     }
 
-    /// Collapses until nothing legal is left.
-    pub fn run(&mut self, progress: Progress) {
-        let all = self.surface.live.len();
-        let mut order = Vec::new();
+    /// Finds every vertex's first candidate.
+    pub fn begin(&mut self) {
+        for i in 0..self.surface.live.len() {
+            let v = self.surface.live[i];
+            self.candidates.refresh(v, &mut self.surface, &mut self.marks);
+        }
+    }
+
+    /// Collapses until nothing legal is left. At the start there were `all` vertices, and `number` says which one of them
+    /// each is. `after_round` is called with the nodes of each round and the key up to which candidates were taken up.
+    pub fn run<E>(
+        &mut self,
+        all: usize,
+        number: impl Fn(u32) -> u32,
+        mut after_round: impl FnMut(&Builder, Range<u32>, f32) -> Result<(), E>,
+    ) -> Result<(), E> {
         // How many vertices there were when virtual edges were last sought, and how far beyond their usual distance.
         let (mut sought_among, mut reach) = (usize::MAX, 1.0);
         let mut hopeless_retried = false;
         loop {
-            progress((all - self.surface.live.len()) as u64, all as u64);
             if self.merge && self.surface.live.len() <= sought_among / 2 {
                 sought_among = self.surface.live.len();
-                self.seek_virtual_edges(reach);
+                self.seek_virtual_edges(reach, 0..self.surface.live.len());
             }
-            self.refresh_candidates();
             if let Some(limit) = self.key_limit() {
-                if self.run_round(limit, &mut order) {
+                let first = self.nodes.next();
+                self.run_round(limit, all, &number, 0..self.surface.live.len());
+                if self.nodes.next() > first {
+                    self.surface.rebuild_stars();
+                    after_round(self, first..self.nodes.next(), limit)?;
                     hopeless_retried = false;
                 }
             } else if !hopeless_retried {
                 hopeless_retried = true;
-                self.retry_hopeless();
+                self.retry_hopeless(0..self.surface.live.len());
             } else if self.merge && reach < FARTHEST_REACH {
                 reach *= 2.0;
-                self.seek_virtual_edges(reach);
+                self.seek_virtual_edges(reach, 0..self.surface.live.len());
             } else {
-                return;
+                return Ok(());
             }
         }
     }
 
-    /// Says whether anything has been collapsed.
-    fn run_round(&mut self, limit: f32, order: &mut Vec<u64>) -> bool {
-        let first = self.nodes.next();
-        for start in (0..self.surface.live.len()).step_by(BLOCK) {
-            let end = self.surface.live.len().min(start + BLOCK);
-            order.clear();
-            for &v in &self.surface.live[start..end] {
-                let key = self.candidates.key[v as usize];
-                if self.candidates.state[v as usize] != State::Nothing && key <= limit {
-                    // Keys are not negative, so their bits sort as they do; ties go by vertex number.
-                    order.push(u64::from(key.to_bits()) << 32 | u64::from(v));
-                }
-            }
-            order.sort_unstable();
-            for &entry in order.iter() {
-                self.attempt(entry as u32, first, limit);
-            }
+    /// A round over the vertices `live[range]`; for the others see [`run`](Self::run). Stars have to be rebuilt afterwards
+    /// if there are new nodes.
+    pub fn run_round(&mut self, limit: f32, all: usize, number: impl Fn(u32) -> u32, range: Range<usize>) {
+        let first_id = self.nodes.next_id;
+        let width = block_width(all, self.surface.live.len());
+        let mut start = range.start;
+        while start < range.end {
+            let block = |i: usize| number(self.surface.live[i]) / width;
+            let end = (start..range.end).find(|&i| block(i) != block(start)).unwrap_or(range.end);
+            self.run_block(limit, first_id, start..end);
+            start = end;
         }
-        if self.nodes.next() == first {
-            return false;
-        }
-        self.rounds.push(first);
-        self.surface.rebuild_stars();
-        true
+        self.candidates.parity = self.candidates.parity.other();
     }
 
-    /// The key up to which candidates are taken up: the median.
-    fn key_limit(&self) -> Option<f32> {
-        let candidates = &self.candidates;
-        let live = self.surface.live.iter().map(|&v| v as usize);
-        let mut keys: Vec<u32> = live
-            .filter(|&v| candidates.state[v] != State::Nothing)
-            .map(|v| candidates.key[v].to_bits())
-            .collect();
-        let last = (keys.len() / 2).max(keys.len().min(LEAST)).checked_sub(1)?;
-        let (_, &mut limit, _) = keys.select_nth_unstable(last);
-        Some(f32::from_bits(limit))
-    }
-
-    fn refresh_candidates(&mut self) {
-        for i in 0..self.surface.live.len() {
+    /// The part of a round in which the vertices `live[range]` come up, which are one block. `first` is the first node of
+    /// the round.
+    pub fn run_block(&mut self, limit: f32, first: u32, range: Range<usize>) {
+        self.order.clear();
+        for i in range {
             let v = self.surface.live[i];
-            match self.candidates.state[v as usize] {
-                State::Outdated => self.candidates.refresh(v, &mut self.surface, &mut self.marks),
-                State::Updated => self.candidates.state[v as usize] = State::Cheapest,
-                _ => {}
+            self.candidates.visit(v, &mut self.surface, &mut self.marks);
+            let key = self.candidates.key[v as usize];
+            if self.candidates.state[v as usize] != State::Nothing && key <= limit {
+                // Keys are not negative, so their bits sort as they do; ties go by vertex number.
+                self.order.push(u64::from(key.to_bits()) << 32 | u64::from(v));
             }
         }
+        self.order.sort_unstable();
+        for i in 0..self.order.len() {
+            self.attempt(self.order[i] as u32, first, limit);
+        }
+    }
+
+    fn key_limit(&self) -> Option<f32> {
+        let mut counts = KeyCounts::default();
+        for &v in &self.surface.live {
+            self.candidates.count(v, &mut counts);
+        }
+        counts.limit()
     }
 
     /// Looks again at vertices without a legal edge: what forbade it may have gone, though their own star is the same.
-    fn retry_hopeless(&mut self) {
-        for i in 0..self.surface.live.len() {
+    pub fn retry_hopeless(&mut self, range: Range<usize>) {
+        for i in range {
             let v = self.surface.live[i];
             if self.candidates.state[v as usize] == State::Nothing {
                 self.find_legal(v);
@@ -180,11 +189,13 @@ impl Builder {
     /// it is legal.
     fn attempt(&mut self, v: u32, first: u32, limit: f32) {
         let state = self.candidates.state[v as usize];
-        if matches!(state, State::Outdated | State::Updated | State::Nothing) {
+        if matches!(state, State::Outdated(_) | State::Updated(_) | State::Nothing) {
             return;
         }
         let u = self.candidates.target[v as usize];
-        if self.surface.merged_into[u as usize] != NONE || is_from(self.nodes.top[u as usize], first) {
+        if self.surface.merged_into[u as usize] != NONE
+            || self.nodes.is_from(self.nodes.top[u as usize], first)
+        {
             return;
         }
         self.star.clear();
@@ -200,11 +211,16 @@ impl Builder {
             return;
         }
         self.find_bereaved(u);
-        if self.bereaved.iter().any(|&w| is_from(self.nodes.trace[w as usize], first)) {
+        if self.bereaved.iter().any(|&w| self.nodes.is_from(self.nodes.trace[w as usize], first)) {
             return;
         }
         let error = self.measure(v, u);
-        let key = (MEASURED_WEIGHT * error * error).max(self.candidates.key[v as usize]);
+        if !self.star.is_empty() && self.samples.nothing_new() {
+            // Where components are joined, the last triangles of one could go, with nothing near to take their place.
+            self.candidates.state[v as usize] = State::Nothing;
+            return;
+        }
+        let key = (MEASURED_WEIGHT * error * error).min(f32::MAX).max(self.candidates.key[v as usize]);
         self.candidates.key[v as usize] = key;
         if key > limit {
             if state == State::Cheapest {
@@ -246,6 +262,12 @@ impl Builder {
             joined && !surface.special[v as usize] && self.candidates.state[v as usize] != State::Forced;
         surface.special[u as usize] |= !regular;
         surface.joined[u as usize] |= surface.joined[v as usize] || !joined;
+        let updated = State::Updated(self.candidates.parity);
+        if let Some(touched) = &mut self.touched {
+            touched.extend([v, u]);
+            touched.extend(self.star.iter().flat_map(|s| [s.next, s.last]));
+            touched.extend(self.others.iter().flat_map(|&t| surface.triangles[t as usize].corners));
+        }
         for spoke in &self.star {
             let triangle = &mut surface.triangles[spoke.triangle as usize];
             triangle.samples = NONE;
@@ -259,13 +281,13 @@ impl Builder {
             for w in [spoke.next, spoke.last] {
                 surface.special[w as usize] |= !regular;
                 // Most neighbours come along twice.
-                if w == spoke.next || self.candidates.state[w as usize] != State::Updated {
+                if w == spoke.next || self.candidates.state[w as usize] != updated {
                     self.candidates.neighbour_merged(w, v, u, surface);
                 }
             }
         }
         for w in surface.virtual_edges.partners(v).chain([u]) {
-            self.candidates.state[w as usize] = State::Outdated;
+            self.candidates.state[w as usize] = State::Outdated(self.candidates.parity);
         }
         surface.merged_into[v as usize] = u;
         self.samples.finish(|t, list| surface.triangles[t as usize].samples = list);
@@ -330,23 +352,25 @@ impl Builder {
         samples.error()
     }
 
-    /// Finds pairs for virtual edges, as far apart as vertices are on average on a plane, times `reach`.
-    fn seek_virtual_edges(&mut self, reach: f32) {
+    /// Finds pairs for virtual edges among the vertices `live[range]`, as far apart as vertices are on average on a plane,
+    /// times `reach`.
+    fn seek_virtual_edges(&mut self, reach: f32, range: Range<usize>) {
         let surface = &mut self.surface;
-        let positions = || surface.live.iter().map(|&v| surface.position(v));
+        let vertices = surface.live[range].to_vec();
+        let positions = || vertices.iter().map(|&v| surface.position(v));
         let low = positions().fold(glam::Vec3::INFINITY, glam::Vec3::min);
         let high = positions().fold(glam::Vec3::NEG_INFINITY, glam::Vec3::max);
         let mut sides = (high - low).to_array();
         sides.sort_by(|a, b| b.total_cmp(a));
-        let count = surface.live.len() as f32;
+        let count = vertices.len() as f32;
         let spacing = (sides[0] / count).max((sides[0] * sides[1] / count).sqrt());
         let cell = if spacing > 0.0 { 2.0 * spacing * reach } else { 1.0 };
         let mut edges = std::mem::take(&mut surface.virtual_edges);
-        edges.search(surface, cell);
+        edges.search(surface, &vertices, cell);
         surface.virtual_edges = edges;
-        for &v in &surface.live {
+        for v in vertices {
             if surface.virtual_edges.partners(v).next().is_some() {
-                self.candidates.state[v as usize] = State::Outdated;
+                self.candidates.state[v as usize] = State::Outdated(self.candidates.parity.other());
             }
         }
     }
@@ -355,9 +379,10 @@ impl Builder {
 /// Times the average distance of vertices: beyond this, no pair is left to be found.
 const FARTHEST_REACH: f32 = 1e6;
 
-/// Whether `node` is one of the round whose first node is given.
-fn is_from(node: u32, first: u32) -> bool {
-    node != NONE && node >= first
+/// Numbers of vertices in a block, of which between a half and all are there: blocks widen as vertices grow fewer.
+pub(super) fn block_width(all: usize, live: usize) -> u32 {
+    let halvings = (all / live.max(1)).max(1).ilog2();
+    (BLOCK as u32).checked_shl(halvings).filter(|width| width >> halvings == BLOCK as u32).unwrap_or(u32::MAX)
 }
 
 /// Adds the special edges that remain around a special vertex, whose star is given, once it has merged into `u`.

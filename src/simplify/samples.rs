@@ -43,7 +43,9 @@ struct SpecialEdge {
 #[derive(Debug)]
 pub(super) struct Samples {
     /// The next point of the same triangle, or `NONE`.
-    next: Vec<u32>,
+    pub next: Vec<u32>,
+    /// For each point, its number in the whole construction, where only some are here, in any order.
+    pub ids: Option<Vec<u32>>,
     /// What is there before and after the collapse.
     old: Faces,
     new: Faces,
@@ -60,6 +62,7 @@ impl Samples {
     pub fn new(count: usize) -> Samples {
         Samples {
             next: vec![NONE; count],
+            ids: None,
             old: Faces::default(),
             new: Faces::default(),
             triangles: Vec::new(),
@@ -175,11 +178,13 @@ impl Samples {
 
     /// Cuts every list to [`MOST_POINTS`].
     fn thin_out(&mut self) {
+        let ids = self.ids.as_ref();
+        let id = |point: u32| ids.map_or(point, |ids| ids[point as usize]);
         self.placed.sort_unstable_by(|a, b| {
             a.face
                 .cmp(&b.face)
                 .then(b.distance_squared.total_cmp(&a.distance_squared))
-                .then(a.point.cmp(&b.point))
+                .then_with(|| id(a.point).cmp(&id(b.point)))
         });
         let (mut kept, mut start) = (0, 0);
         while start < self.placed.len() {

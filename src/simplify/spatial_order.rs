@@ -5,20 +5,34 @@
 
 use glam::Vec3;
 
+/// The curve through a box.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Curve {
+    low: Vec3,
+    /// Cells a unit of length.
+    cells: f32,
+}
+
+impl Curve {
+    pub fn new(low: Vec3, high: Vec3) -> Curve {
+        let side = (high - low).max_element();
+        Curve { low, cells: if side > 0.0 { 1023.99 / side } else { 0.0 } }
+    }
+
+    /// How far along the curve a point of the box lies.
+    pub fn key(&self, p: Vec3) -> u32 {
+        let cell = (p - self.low) * self.cells;
+        spread(cell.x as u32) | spread(cell.y as u32) << 1 | spread(cell.z as u32) << 2
+    }
+}
+
 /// The input numbers of the vertices in spatial order.
 pub(super) fn spatial_order(positions: &[Vec3]) -> Vec<u32> {
-    let lo = positions.iter().fold(Vec3::INFINITY, |lo, &p| lo.min(p));
-    let hi = positions.iter().fold(Vec3::NEG_INFINITY, |hi, &p| hi.max(p));
-    let side = (hi - lo).max_element();
-    let cells = if side > 0.0 { 1023.99 / side } else { 0.0 };
-    let mut order: Vec<u64> = (0_u64..)
-        .zip(positions)
-        .map(|(v, &p)| {
-            let cell = (p - lo) * cells;
-            let key = spread(cell.x as u32) | spread(cell.y as u32) << 1 | spread(cell.z as u32) << 2;
-            u64::from(key) << 32 | v
-        })
-        .collect();
+    let low = positions.iter().fold(Vec3::INFINITY, |low, &p| low.min(p));
+    let high = positions.iter().fold(Vec3::NEG_INFINITY, |high, &p| high.max(p));
+    let curve = Curve::new(low, high);
+    let mut order: Vec<u64> =
+        (0_u64..).zip(positions).map(|(v, &p)| u64::from(curve.key(p)) << 32 | v).collect();
     order.sort_unstable();
     order.into_iter().map(|entry| entry as u32).collect()
 }

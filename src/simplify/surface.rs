@@ -53,6 +53,8 @@ pub(super) struct Surface {
     /// Triangles that have not vanished.
     pub live_triangles: usize,
     pub virtual_edges: VirtualEdges,
+    /// For each triangle, its number in the whole construction, where only some are here, in any order.
+    pub triangle_ids: Option<Vec<u32>>,
     star_start: Vec<u32>,
     star_length: Vec<u32>,
     incident: Vec<u32>,
@@ -77,6 +79,7 @@ impl Surface {
             live: (0..count as u32).filter(|&v| has_triangle[v as usize]).collect(),
             live_triangles: triangles.len(),
             virtual_edges: VirtualEdges::default(),
+            triangle_ids: None,
             star_start: vec![0; count],
             star_length: vec![0; count],
             incident: Vec::new(),
@@ -85,8 +88,42 @@ impl Surface {
         surface
     }
 
+    /// A part of a larger mesh: its first `vertices` positions are vertices, the others sample points. `special` says
+    /// for all of them whether they are. `ids` are the numbers of the triangles in the whole mesh, which has
+    /// `live_triangles`.
+    pub fn part(
+        vertices: usize,
+        positions: Vec<Vec3>,
+        special: Vec<bool>,
+        triangles: Vec<Triangle>,
+        ids: Vec<u32>,
+        live_triangles: usize,
+    ) -> Surface {
+        let mut surface = Surface {
+            positions,
+            quadrics: vec![Quadric::default(); vertices],
+            special,
+            joined: vec![false; vertices],
+            merged_into: vec![NONE; vertices],
+            triangles,
+            live: (0..vertices as u32).collect(),
+            live_triangles,
+            virtual_edges: VirtualEdges::default(),
+            triangle_ids: Some(ids),
+            star_start: vec![0; vertices],
+            star_length: vec![0; vertices],
+            incident: Vec::new(),
+        };
+        surface.rebuild_stars();
+        surface
+    }
+
     /// Drops what has vanished and finds the stars anew, by counting.
     pub fn rebuild_stars(&mut self) {
+        if let Some(ids) = &mut self.triangle_ids {
+            let mut there = self.triangles.iter().map(|t| t.corners[0] != NONE);
+            ids.retain(|_| there.next().unwrap_or(false));
+        }
         self.triangles.retain(|t| t.corners[0] != NONE);
         self.live.retain(|&v| self.merged_into[v as usize] == NONE);
         for &v in &self.live {
@@ -109,7 +146,28 @@ impl Surface {
                 *length += 1;
             }
         }
+        if let Some(ids) = &self.triangle_ids {
+            for &v in &self.live {
+                let start = self.star_start[v as usize] as usize;
+                let star = &mut self.incident[start..start + self.star_length[v as usize] as usize];
+                star.sort_unstable_by_key(|&t| ids[t as usize]);
+            }
+        }
         self.virtual_edges.follow(&self.merged_into);
+    }
+
+    /// Leaves those triangles of the star of `v` out of it that `is_hidden` names, until the stars are rebuilt.
+    pub fn hide(&mut self, v: u32, is_hidden: impl Fn(&Triangle) -> bool) {
+        let start = self.star_start[v as usize] as usize;
+        let mut kept = 0;
+        for i in 0..self.star_length[v as usize] as usize {
+            let t = self.incident[start + i];
+            if !is_hidden(&self.triangles[t as usize]) {
+                self.incident[start + kept] = t;
+                kept += 1;
+            }
+        }
+        self.star_length[v as usize] = kept as u32;
     }
 
     /// The triangles that were around `v` when the stars were last rebuilt, and still are.

@@ -69,11 +69,11 @@ impl VirtualEdges {
         }
     }
 
-    /// Adds pairs that are at most as far apart as neighbouring cells of size `cell` allow. Says whether there are any.
-    pub fn search(&mut self, surface: &Surface, cell: f32) -> bool {
+    /// Adds pairs among `vertices` that are at most as far apart as neighbouring cells of size `cell` allow.
+    pub fn search(&mut self, surface: &Surface, vertices: &[u32], cell: f32) {
         let component = components(surface);
-        let grid = Grid::new(&surface.positions, &surface.live, cell);
-        for &v in &surface.live {
+        let grid = Grid::new(&surface.positions, vertices, cell);
+        for &v in vertices {
             let mut nearest: Vec<(f32, u32)> = Vec::with_capacity(PARTNERS + 1);
             grid.for_each_near(surface.position(v), |w| {
                 if component[w as usize] == component[v as usize] {
@@ -99,7 +99,6 @@ impl VirtualEdges {
             self.pairs.extend(nearest.into_iter().map(|(_, w)| [v, w]));
         }
         self.index(surface.positions.len());
-        !self.pairs.is_empty()
     }
 }
 

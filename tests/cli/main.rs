@@ -3,4 +3,5 @@
 mod commands;
 mod comparison;
 mod failures;
+mod memory;
 mod workplace;

@@ -30,7 +30,7 @@ mod tree;
 
 pub use bounds::Bounds;
 pub use log::{Collapse, CollapseLog, Forest, LogError, NONE};
-pub use log_file::{LogFileError, read_log, write_log};
+pub use log_file::{LogCounts, LogFileError, read_log, write_log, write_log_from};
 pub use mesh::Mesh;
 pub use prefetch::prefetch;
 pub use sink::{MeshSink, NullSink, TriangleId, VertexId};

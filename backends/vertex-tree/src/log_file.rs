@@ -112,29 +112,74 @@ pub enum LogFileError {
 /// # Errors
 /// [`LogFileError::Io`].
 pub fn write_log(path: &Path, log: &CollapseLog) -> Result<(), LogFileError> {
+    let counts = LogCounts {
+        vertices: log.mesh.positions.len() as u64,
+        triangles: log.mesh.triangles.len() as u64,
+        collapses: log.collapses.len() as u64,
+    };
+    let (positions, triangles) = (log.mesh.positions.iter(), log.mesh.triangles.iter());
+    let collapses = log.collapses.iter();
+    write_log_from(
+        path,
+        counts,
+        positions.map(|&p| Ok(p)),
+        triangles.map(|&t| Ok(t)),
+        collapses.map(|&c| Ok(c)),
+    )
+}
+
+/// How many records a log has of each kind.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct LogCounts {
+    /// Vertices.
+    pub vertices: u64,
+    /// Triangles.
+    pub triangles: u64,
+    /// Collapses.
+    pub collapses: u64,
+}
+
+/// Writes a log that is not in memory, as [`write_log`] does. What the iterators give is taken as it is: that it makes
+/// a log, as [`CollapseLog::forest`] demands, is up to the caller.
+///
+/// # Errors
+/// [`LogFileError::Io`], also with whatever an iterator says, and if one gives more or fewer records than announced.
+pub fn write_log_from(
+    path: &Path,
+    counts: LogCounts,
+    positions: impl Iterator<Item = io::Result<[f32; 3]>>,
+    triangles: impl Iterator<Item = io::Result<[u32; 3]>>,
+    collapses: impl Iterator<Item = io::Result<Collapse>>,
+) -> Result<(), LogFileError> {
     let io = |source| LogFileError::Io { file: path.to_owned(), source };
     output::write_with(path, |file| {
         let mut out = BufWriter::with_capacity(1 << 20, file);
-        write_to(&mut out, log)?;
+        write_to(&mut out, counts, positions, triangles, collapses)?;
         out.flush()
     })
     .map_err(io)
 }
 
-fn write_to(out: &mut impl Write, log: &CollapseLog) -> io::Result<()> {
+fn write_to(
+    out: &mut impl Write,
+    counts: LogCounts,
+    positions: impl Iterator<Item = io::Result<[f32; 3]>>,
+    triangles: impl Iterator<Item = io::Result<[u32; 3]>>,
+    collapses: impl Iterator<Item = io::Result<Collapse>>,
+) -> io::Result<()> {
     let mut header = Vec::with_capacity(HEADER_BYTES as usize);
     header.extend_from_slice(&MAGIC);
     header.extend_from_slice(&VERSION.to_le_bytes());
     header.extend_from_slice(&0_u32.to_le_bytes());
-    for count in [log.mesh.positions.len(), log.mesh.triangles.len(), log.collapses.len()] {
-        header.extend_from_slice(&(count as u64).to_le_bytes());
+    for count in [counts.vertices, counts.triangles, counts.collapses] {
+        header.extend_from_slice(&count.to_le_bytes());
     }
     header.extend_from_slice(&crc32fast::hash(&header).to_le_bytes());
     out.write_all(&header)?;
     let checksums = [
-        write_section(out, &log.mesh.positions, |p, bytes| put(bytes, p.map(f32::to_le_bytes)))?,
-        write_section(out, &log.mesh.triangles, |t, bytes| put(bytes, t.map(u32::to_le_bytes)))?,
-        write_section(out, &log.collapses, |c, bytes| {
+        write_section(out, counts.vertices, positions, |p, bytes| put(bytes, p.map(f32::to_le_bytes)))?,
+        write_section(out, counts.triangles, triangles, |t, bytes| put(bytes, t.map(u32::to_le_bytes)))?,
+        write_section(out, counts.collapses, collapses, |c, bytes| {
             put(bytes, [c.removed.to_le_bytes(), c.kept.to_le_bytes()]);
             put(bytes, c.bounds.center.map(f32::to_le_bytes));
             put(bytes, [c.bounds.radius.to_le_bytes(), c.bounds.eps.to_le_bytes()]);
@@ -152,20 +197,27 @@ fn put<const N: usize>(bytes: &mut Vec<u8>, words: [[u8; 4]; N]) {
 
 fn write_section<T>(
     out: &mut impl Write,
-    records: &[T],
+    count: u64,
+    mut records: impl Iterator<Item = io::Result<T>>,
     encode: impl Fn(&T, &mut Vec<u8>),
 ) -> io::Result<u32> {
     let mut checksum = crc32fast::Hasher::new();
     let mut bytes = Vec::new();
-    for chunk in records.chunks(CHUNK) {
+    let mut left = count;
+    while left > 0 {
         bytes.clear();
-        for record in chunk {
-            encode(record, &mut bytes);
+        let now = left.min(CHUNK as u64);
+        for _ in 0..now {
+            encode(&records.next().ok_or(io::ErrorKind::UnexpectedEof)??, &mut bytes);
         }
         checksum.update(&bytes);
         out.write_all(&bytes)?;
+        left -= now;
     }
-    Ok(checksum.finalize())
+    match records.next() {
+        None => Ok(checksum.finalize()),
+        Some(_) => Err(io::Error::other(format!("more records than the {count} announced"))),
+    }
 }
 
 /// Reads a log and checks it.

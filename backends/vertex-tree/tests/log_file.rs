@@ -2,7 +2,10 @@
 
 use std::path::{Path, PathBuf};
 
-use vertex_tree::{Bounds, Collapse, CollapseLog, LogError, LogFileError, Mesh, read_log, write_log};
+use vertex_tree::{
+    Bounds, Collapse, CollapseLog, LogCounts, LogError, LogFileError, Mesh, read_log, write_log,
+    write_log_from,
+};
 
 /// Two triangles; 3 merges into 2 and 2 into 0.
 ///
@@ -303,4 +306,33 @@ fn what_can_not_be_written_is_not_there() {
     assert_eq!(names(&inside), [""; 0]);
     let error = read_log(&inside.join("x.log")).unwrap_err();
     assert!(matches!(error, LogFileError::Io { .. }), "{error}");
+}
+
+/// Written piece by piece, the bytes are the same; where a piece is missing, is too many or can not be had, there is no
+/// file.
+#[test]
+fn pieces_make_the_same_file_or_none() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("pieces");
+    let log = square();
+    let right = LogCounts { vertices: 4, triangles: 2, collapses: 2 };
+    let write = |counts: LogCounts, fail: bool| {
+        let triangles =
+            log.mesh.triangles.iter().map(|&t| if fail { Err(std::io::Error::other("gone")) } else { Ok(t) });
+        let positions = log.mesh.positions.iter().map(|&p| Ok(p));
+        write_log_from(&path, counts, positions, triangles, log.collapses.iter().map(|&c| Ok(c)))
+    };
+    write(right, false).unwrap();
+    assert_eq!(std::fs::read(&path).unwrap(), square_bytes());
+    std::fs::remove_file(&path).unwrap();
+    for (counts, fail, said) in [
+        (LogCounts { vertices: 5, ..right }, false, "end of file"),
+        (LogCounts { triangles: 1, ..right }, false, "more records than the 1 announced"),
+        (LogCounts { collapses: 0, ..right }, false, "more records than the 0 announced"),
+        (right, true, "gone"),
+    ] {
+        let error = write(counts, fail).unwrap_err();
+        assert!(matches!(error, LogFileError::Io { .. }) && error.to_string().contains(said), "{error}");
+        assert_eq!(std::fs::read_dir(folder.path()).unwrap().count(), 0);
+    }
 }

@@ -1,0 +1,93 @@
+//! Building within a given memory.
+
+use std::time::{Duration, Instant};
+
+use foldfront::Mesh;
+
+use crate::workplace::Workplace;
+
+/// A wavy grid of `side * side` vertices.
+fn large(side: u32) -> Mesh {
+    let height = |x: u32, y: u32| ((x * x + 3 * y * y + x * y) % 97) as f32 * 0.05;
+    let vertices = (0..side * side).map(|v| (v % side, v / side));
+    let positions = vertices.map(|(x, y)| [x as f32, y as f32, height(x, y)]).collect();
+    let squares = (0..side - 1).flat_map(|y| (0..side - 1).map(move |x| y * side + x));
+    let triangles = squares.flat_map(|v| [[v, v + 1, v + side + 1], [v, v + side + 1, v + side]]).collect();
+    Mesh { positions, triangles }
+}
+
+fn with_large(side: u32) -> Workplace {
+    let place = Workplace::new();
+    foldfront::mesh_io::write_ply(&place.file("large.ply"), &large(side), None).unwrap();
+    place
+}
+
+#[test]
+fn the_file_is_the_same_whatever_the_memory() {
+    let place = with_large(120);
+    std::fs::create_dir(place.file("temp")).unwrap();
+    let whole = place.succeed("build large.ply -o whole.log");
+    assert!(whole.contains("triangles            28322\n"), "{whole}");
+    for options in ["--memory 64K", "--memory 1M --temp temp", "--memory 1G"] {
+        let pieces = place.succeed(&format!("build large.ply -o pieces.log {options}"));
+        assert!(place.read("whole.log") == place.read("pieces.log"), "{options}");
+        let without_time = |text: &str| text.lines().take(9).collect::<Vec<_>>().join("\n");
+        assert_eq!(without_time(&whole), without_time(&pieces), "{options}");
+    }
+    assert!(place.names("temp").is_empty());
+}
+
+#[test]
+fn what_is_wrong_with_the_input_or_the_options_is_said() {
+    let place = Workplace::new();
+    let whole = place.read("grid.ply");
+    place.write("truncated.ply", &whole[..whole.len() - 100]);
+    place.write("range.obj", "v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\nf 1 2 4\n");
+    place.fail("build truncated.ply -o out.log --memory 1M", 1, &["truncated.ply: face 2", "ends too early"]);
+    place.fail("build range.obj -o out.log --memory 1M", 1, &["range.obj: line 5: no vertex 4, there are 3"]);
+    place.fail("build grid.ply -o out.log --memory 1M --temp nowhere", 1, &["nowhere"]);
+    for size in ["0", "1.5M", "many", "-1"] {
+        place.fail(&format!("build grid.ply -o out.log --memory={size}"), 2, &["--memory", size]);
+    }
+    place.fail("build grid.ply -o out.log --temp .", 2, &["--memory"]);
+}
+
+/// A limit on the length of files stands in for a full disk: writing fails in the same way.
+#[cfg(unix)]
+#[test]
+fn a_full_disk_is_an_error_and_leaves_nothing() {
+    let place = with_large(200);
+    let build = concat!(env!("CARGO_BIN_EXE_foldfront"), " build large.ply -o out.log --memory 1M");
+    // Temporary files of 400 blocks of 512 bytes; the signal that comes with the error is not for the program.
+    let script = format!("trap '' XFSZ; ulimit -f 400; exec {build}");
+    let mut command = place.command("");
+    command = {
+        let mut shell = std::process::Command::new("sh");
+        shell.args(["-c", &script]).current_dir(command.get_current_dir().unwrap());
+        shell
+    };
+    place.fail_as(&mut command, &script, 1, &["temporary files in .: ", "too large"]);
+}
+
+/// An interrupted build says so, and leaves neither its output nor anything temporary.
+#[cfg(unix)]
+#[test]
+fn an_interrupt_leaves_nothing() {
+    let place = with_large(400);
+    let before = place.everything();
+    let mut child = place
+        .command("build large.ply -o out.log --memory 64K")
+        .stderr(std::process::Stdio::piped())
+        .spawn()
+        .unwrap();
+    std::thread::sleep(Duration::from_millis(300));
+    assert!(child.try_wait().unwrap().is_none(), "already finished");
+    let pid = child.id().to_string();
+    assert!(std::process::Command::new("kill").args(["-INT", &pid]).status().unwrap().success());
+    let sent = Instant::now();
+    let output = child.wait_with_output().unwrap();
+    println!("ended {:?} later", sent.elapsed());
+    assert_eq!(output.status.code(), Some(1));
+    assert_eq!(String::from_utf8_lossy(&output.stderr), "foldfront: interrupted\n");
+    assert_eq!(place.everything(), before);
+}
