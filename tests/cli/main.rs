@@ -1,5 +1,6 @@
 //! The program as its users run it: arguments in; files, lines and an exit code out.
 
+mod backends;
 mod commands;
 mod comparison;
 mod failures;
