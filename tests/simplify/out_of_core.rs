@@ -177,7 +177,7 @@ fn failures_are_named() {
         let outcome = build_within(read, &missing, &options(false), &limits, &mut |_, _| ());
         match outcome {
             Err(OutOfCoreError::Mesh(LogError::BadPosition { vertex: 100, .. })) => {
-                assert!(position[1].is_nan())
+                assert!(position[1].is_nan());
             }
             Err(OutOfCoreError::Mesh(LogError::CornerOutOfRange { vertex, vertices, .. })) => {
                 assert_eq!((vertex, vertices), (101, 101));
