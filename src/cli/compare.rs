@@ -33,7 +33,7 @@ pub(super) fn compare(command: &Compare) -> Result<()> {
     let arguments: Vec<String> = std::env::args().skip(1).collect();
     let mut report = Report { command: format!("foldfront {}", arguments.join(" ")), sections: Vec::new() };
     for (input, name) in inputs.iter().zip(unique_names(&inputs)) {
-        for subject in input.replayable(&command.backend, &BuildOptions::from(&command.storage))? {
+        for subject in input.replayable(&name, &command.backend, &BuildOptions::from(&command.storage))? {
             let name = match (&command.backend[..], subject.subject.backend()) {
                 ([] | [_], _) => name.clone(),
                 (_, backend) => format!("{name}-{}", backend.name()),

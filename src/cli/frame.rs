@@ -29,7 +29,8 @@ fn check_frame(path: &Path, frame: usize) -> Result<()> {
 
 /// The one thing that the arguments name.
 fn subject(arguments: &[String]) -> Result<Replayable> {
-    let mut all = Input::one(arguments)?.replayable(&[], &BuildOptions::default())?;
+    let input = Input::one(arguments)?;
+    let mut all = input.replayable(&input.name(), &[], &BuildOptions::default())?;
     all.pop().context("one backend is one subject")
 }
 

@@ -145,9 +145,13 @@ pub(super) struct Replayable {
 }
 
 impl Input {
-    /// Opens the input in each of these backends; in its own, if there are none.
-    pub fn replayable(&self, backends: &[Backend], options: &BuildOptions) -> Result<Vec<Replayable>> {
-        let name = self.name();
+    /// Opens the input under a name in each of these backends; in its own, if there are none.
+    pub fn replayable(
+        &self,
+        name: &str,
+        backends: &[Backend],
+        options: &BuildOptions,
+    ) -> Result<Vec<Replayable>> {
         if let Self::Stored(path) = self {
             let store = Store::open(path)?;
             let own = store.backend();
@@ -155,7 +159,7 @@ impl Input {
                 bail!("{}: is for {}, not for {}", path.display(), own.name(), other.name());
             }
             let facts = store.facts();
-            let subject = Subject::of_store(&name, store);
+            let subject = Subject::of_store(name, store);
             let mesh = stage(&format!("{name}: reading"), |_| subject.finest())?;
             return Ok(vec![Replayable { subject, built: None, facts, mesh, folder: None }]);
         }
@@ -167,14 +171,14 @@ impl Input {
                 (Store::in_memory(log.clone())?, None)
             } else {
                 let folder = tempfile::tempdir()?;
-                let file = folder.path().join(&name);
+                let file = folder.path().join("hierarchy");
                 stage(&format!("{name}: writing for {}", backend.name()), |_| {
                     store::write(backend, &file, &log, options)
                 })?;
                 (Store::open(&file)?, Some(folder))
             };
             let facts = store.facts();
-            let subject = Subject::of_store(&name, store);
+            let subject = Subject::of_store(name, store);
             let mesh = log.mesh.clone();
             Ok(Replayable { subject, built: built.clone(), facts, mesh, folder })
         };
