@@ -5,7 +5,7 @@
 //!
 //! * An event carries what its test needs (sphere and error), so a bucket streams through the cache instead of
 //!   missing it once a node.
-//! * Time is continuous, in ticks of a small part of a frame at full speed, and the buffer is *geometric*: level `l`
+//! * Time is continuous, in ticks of a small part of a frame of a clock, and the buffer is *geometric*: level `l`
 //!   is a ring of 16 slots, each `2^l` ticks wide. A deadline `t` ticks ahead goes to the level on which `t` is 8 to
 //!   15 slots away, so it is known to an eighth of itself and the horizon is practically unlimited.
 //! * There is no cascading from level to level: a slot is drained as soon as the clock reaches its start, so an
@@ -25,7 +25,7 @@ use vertex_tree::{Bounds, prefetch};
 
 use crate::front::Slot;
 
-/// Ticks in a frame at full speed. A camera far below full speed still has ticks that are finer than its frames.
+/// Ticks in a frame of a clock. A camera far slower than its course still has ticks that are finer than its frames.
 pub const TICKS_PER_FRAME: f64 = 512.0;
 
 /// Slots a level. Deadlines go to the level on which they are at least half of this away.
@@ -33,7 +33,7 @@ const SLOTS: u64 = 16;
 /// Level 28 reaches 2^32 ticks ahead, which is further than any deadline: those are `u32` ticks ahead, and what is
 /// further is scheduled again.
 const LEVELS: usize = 29;
-/// The furthest that an event is scheduled ahead, in ticks: 4 million frames at full speed.
+/// The furthest that an event is scheduled ahead, in ticks: 4 million frames.
 pub const HORIZON: u32 = 1 << 31;
 
 /// Which status change an event waits for.

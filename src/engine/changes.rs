@@ -1,0 +1,444 @@
+//! Carrying out status changes, and what follows from them.
+//!
+//! Folds come first, then unfolds, each to a fixpoint: a node that comes into play in the course of this is tested at once
+//! and takes its turn at the end of its list. What a node needs beyond its parents goes on a stack on top of it.
+
+use std::collections::BinaryHeap;
+use std::time::Instant;
+
+use vertex_tree::{MeshSink, NodeId, Step, TreeError, VertexTree};
+
+use crate::budget::{FOLDING_SHARE, WorkCap};
+use crate::front::{Front, Slot};
+use crate::queue::Kind;
+use crate::refine::{Finder, Frame};
+
+/// A node in play and the slot that it was in when this was noted. By the time its turn comes it may have gone out of
+/// play and another node may have come to the slot.
+pub(super) type Noted = (Slot, NodeId);
+
+/// A node waiting on the stack for its turn.
+#[derive(Clone, Copy, PartialEq)]
+pub(super) struct Pending {
+    /// Where the node is, if it is known to be in play.
+    slot: Slot,
+    node: NodeId,
+    /// Whether an entry below waits for this one: a dependency, not something that a view wants.
+    needed: bool,
+    /// Whether this entry waits for those above.
+    waits: bool,
+}
+
+impl Pending {
+    fn wanted((slot, node): Noted) -> Self {
+        Self { slot, node, needed: false, waits: false }
+    }
+    fn needed(node: NodeId) -> Self {
+        Self { slot: Slot::NONE, node, needed: true, waits: false }
+    }
+}
+
+/// Counts of the frame under way.
+#[derive(Default)]
+pub(super) struct Counts {
+    pub unfolds: u64,
+    pub folds: u64,
+    pub forced: u64,
+    pub carried: u64,
+}
+
+/// A change that waits for its turn where work is capped. The most urgent one is the greatest.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
+pub(super) struct Urgent {
+    /// Bits of a number that is not negative, which are in the same order.
+    urgency: u64,
+    slot: Slot,
+    node: NodeId,
+}
+
+/// Changes that are made before the next ones are prepared.
+const TOGETHER: usize = 8;
+
+/// Steps of preparation that are taken.
+const MOST_STEPS: usize = 8;
+
+/// Carries out status changes and what follows from them.
+pub(super) struct Steps<'a, T, M> {
+    pub tree: &'a mut T,
+    pub mesh: &'a mut M,
+    pub front: &'a mut Front,
+    pub finder: &'a mut Finder,
+    pub frame: &'a Frame<'a>,
+    pub stack: &'a mut Vec<Pending>,
+    /// Nodes whose change was refused for want of a page; some more than once.
+    pub missing: &'a mut Vec<NodeId>,
+    /// Nodes whose change a rule of the backend's own forbade; some more than once.
+    pub forbidden: &'a mut Vec<NodeId>,
+    /// The same while others may yet make them possible.
+    pub blocked: &'a mut Vec<Noted>,
+    /// Nodes that no view wants and that something else still needs.
+    pub still_needed: &'a mut Vec<Noted>,
+    /// Collapsible nodes to fold and boundary nodes to unfold, in this order. What follows from a change goes to the end,
+    /// so that its memory is fetched with that of others too.
+    pub folding: &'a mut Vec<Noted>,
+    pub unfolding: &'a mut Vec<Noted>,
+    pub counts: Counts,
+    pub tests: u64,
+}
+
+impl<T: VertexTree, M: MeshSink> Steps<'_, T, M> {
+    /// Folds, then unfolds, and whatever follows.
+    pub fn apply(&mut self) -> Result<(), TreeError> {
+        self.take_turns(Kind::Fold)?;
+        // What a rule forbade when its turn came may have become possible since: to a fixpoint, so that the order in which
+        // a strategy finds changes does not matter.
+        let mut before = None;
+        while !self.blocked.is_empty() && before != Some(self.counts.folds) {
+            before = Some(self.counts.folds);
+            self.folding.clear();
+            self.folding.append(self.blocked);
+            self.take_turns(Kind::Fold)?;
+        }
+        self.forbid();
+        self.take_turns(Kind::Unfold)?;
+        let mut before = None;
+        while !self.blocked.is_empty() && before != Some(self.counts.unfolds) {
+            before = Some(self.counts.unfolds);
+            self.unfolding.clear();
+            self.unfolding.append(self.blocked);
+            self.take_turns(Kind::Unfold)?;
+        }
+        self.let_go()
+    }
+
+    /// What is blocked now stays so in this frame.
+    fn forbid(&mut self) {
+        self.forbidden.extend(self.blocked.drain(..).map(|(_, node)| node));
+    }
+
+    /// What was needed when its turn came may have been let go since.
+    fn let_go(&mut self) -> Result<(), TreeError> {
+        self.forbid();
+        let mut before = None;
+        while !self.still_needed.is_empty() && before != Some(self.counts.folds) {
+            before = Some(self.counts.folds);
+            self.folding.clear();
+            self.folding.append(self.still_needed);
+            self.take_turns(Kind::Fold)?;
+            let front = &*self.front;
+            self.still_needed.sort_unstable();
+            self.still_needed.dedup();
+            self.still_needed.retain(|&noted| is_collapsible(front, noted));
+        }
+        while let Some((slot, _)) = self.still_needed.pop() {
+            self.refused(slot, Kind::Fold);
+        }
+        Ok(())
+    }
+
+    /// The same within a cap, most urgent first. `start` is when the work began.
+    pub fn apply_within(
+        &mut self,
+        cap: WorkCap,
+        start: Instant,
+        [folds, unfolds]: &mut [BinaryHeap<Urgent>; 2],
+    ) -> Result<(), TreeError> {
+        let is_spent = |counts: &Counts, share: f64| match cap {
+            WorkCap::None => false,
+            WorkCap::Changes(most) => (counts.folds + counts.unfolds) as f64 >= most as f64 * share,
+            WorkCap::Time(most) => start.elapsed() >= most.mul_f64(share),
+        };
+        let mut result = Ok(());
+        // Folds that must not wait, unfolds, and folds again with what is left.
+        for (kind, share) in [(Kind::Fold, FOLDING_SHARE), (Kind::Unfold, 1.0), (Kind::Fold, 1.0)] {
+            let heap = if kind == Kind::Fold { &mut *folds } else { &mut *unfolds };
+            loop {
+                // At first all that was found, later what follows from a change.
+                self.await_turn(kind, heap);
+                if result.is_err() || is_spent(&self.counts, share) {
+                    break;
+                }
+                let Some(Urgent { slot, node, .. }) = heap.pop() else { break };
+                result = match kind {
+                    Kind::Fold => self.fold((slot, node)),
+                    Kind::Unfold => self.unfold((slot, node)),
+                };
+            }
+        }
+        for (kind, heap) in [(Kind::Fold, folds), (Kind::Unfold, unfolds)] {
+            for Urgent { slot, node, .. } in heap.drain() {
+                let is_still = if kind == Kind::Fold { is_collapsible } else { is_boundary };
+                if is_still(self.front, (slot, node)) {
+                    self.counts.carried += 1;
+                    self.refused(slot, kind);
+                }
+            }
+        }
+        result.and_then(|()| self.let_go())
+    }
+
+    /// Moves the changes found so far to a heap.
+    fn await_turn(&mut self, kind: Kind, heap: &mut BinaryHeap<Urgent>) {
+        let list = if kind == Kind::Fold { &mut *self.folding } else { &mut *self.unfolding };
+        heap.extend(list.drain(..).map(|(slot, node)| {
+            let urgency = self.frame.criterion.urgency(self.frame.views, &self.front.record(slot).bounds);
+            // Of what is to be folded, the least wanted first.
+            let urgency = if kind == Kind::Fold { 1.0 - urgency.min(1.0) } else { urgency };
+            Urgent { urgency: urgency.max(0.0).to_bits(), slot, node }
+        }));
+    }
+
+    /// The backend can not go on: whatever was to change is to be looked at again when it can.
+    pub fn abandon(&mut self) {
+        let pending = self.stack.drain(..).map(|pending| (pending.slot, pending.node));
+        let mut all: Vec<Noted> = pending.chain(self.still_needed.drain(..)).collect();
+        all.extend(self.folding.iter().chain(&*self.unfolding));
+        for (slot, node) in all {
+            let slot = if slot == Slot::NONE { self.front.find(self.tree, node) } else { slot };
+            if is_collapsible(self.front, (slot, node)) {
+                self.refused(slot, Kind::Fold);
+            } else if is_boundary(self.front, (slot, node)) {
+                self.refused(slot, Kind::Unfold);
+            }
+        }
+    }
+
+    /// Changes the nodes of a list, which may grow meanwhile. While some change, those whose turn comes next are prepared,
+    /// the further off the less.
+    #[inline(always)]
+    fn take_turns(&mut self, kind: Kind) -> Result<(), TreeError> {
+        let mut prepared = [0; MOST_STEPS];
+        let steps = T::PREPARATION.clamp(1, MOST_STEPS);
+        let mut done = 0;
+        while done < self.list(kind).len() {
+            for (step, prepared) in prepared[..steps].iter_mut().enumerate() {
+                let end = self.list(kind).len().min(done + TOGETHER * (steps - step));
+                for &(slot, node) in &self.list(kind)[*prepared..end] {
+                    if step == 0 {
+                        self.front.prefetch_linked(slot);
+                        self.finder.prefetch(slot);
+                    }
+                    self.tree.prepare(node, step, self.mesh);
+                }
+                *prepared = end;
+            }
+            let end = self.list(kind).len().min(done + TOGETHER);
+            for at in done..end {
+                match kind {
+                    Kind::Fold => self.fold(self.folding[at])?,
+                    Kind::Unfold => self.unfold(self.unfolding[at])?,
+                }
+            }
+            done = end;
+        }
+        Ok(())
+    }
+
+    #[inline(always)]
+    fn list(&self, kind: Kind) -> &Vec<Noted> {
+        match kind {
+            Kind::Fold => self.folding,
+            Kind::Unfold => self.unfolding,
+        }
+    }
+
+    fn wanted(&mut self, slot: Slot) -> bool {
+        self.tests += 1;
+        self.frame.unfold(&self.front.record(slot).bounds)
+    }
+
+    fn watch(&mut self, slot: Slot, kind: Kind) {
+        self.finder.watch(self.frame, slot, kind, self.front.bounds(slot));
+    }
+
+    fn refused(&mut self, slot: Slot, kind: Kind) {
+        self.finder.unwatch(slot);
+        self.finder.refused(slot, kind, self.front.bounds(slot));
+    }
+
+    /// Folds a collapsible node that no view wants. Parents that no view wants either follow, once they can.
+    fn fold(&mut self, (slot, node): Noted) -> Result<(), TreeError> {
+        if !is_collapsible(self.front, (slot, node)) {
+            return Ok(());
+        }
+        match self.tree.fold(node, self.mesh)? {
+            Step::Done => {}
+            Step::NotResident => {
+                self.missing.push(node);
+                self.refused(slot, Kind::Fold);
+                return Ok(());
+            }
+            Step::Blocked => {
+                self.blocked.push((slot, node));
+                self.refused(slot, Kind::Fold);
+                return Ok(());
+            }
+            Step::StillNeeded | Step::Needs(_) => {
+                self.still_needed.push((slot, node));
+                return Ok(());
+            }
+        }
+        self.counts.folds += 1;
+        for child in self.front.children(self.tree, slot) {
+            self.finder.unwatch(child);
+        }
+        self.finder.unwatch(slot);
+        self.front.set_folded(self.tree, slot);
+        self.watch(slot, Kind::Unfold);
+        for parent in self.front.parents(self.tree, slot) {
+            let record = self.front.record(parent);
+            if record.is_collapsible() {
+                self.tests += 1;
+                if self.frame.unfold(&record.bounds) {
+                    self.finder.watch(self.frame, parent, Kind::Fold, record.bounds);
+                } else {
+                    self.folding.push((parent, record.node));
+                }
+            }
+        }
+        Ok(())
+    }
+
+    /// Unfolds a boundary node that some view wants, and before it what the backend says it needs. Children that are
+    /// wanted too follow.
+    #[inline(always)]
+    fn unfold(&mut self, (slot, node): Noted) -> Result<(), TreeError> {
+        if !is_boundary(self.front, (slot, node)) {
+            return Ok(());
+        }
+        match self.tree.unfold(node, self.mesh)? {
+            Step::Done => self.unfolded(slot),
+            step => {
+                self.stack.push(Pending::wanted((slot, node)));
+                self.wait_or_give_up((slot, node), step);
+                self.unfold_needed()?;
+            }
+        }
+        Ok(())
+    }
+
+    /// Unfolds what waits on the stack, from the top.
+    #[cold]
+    fn unfold_needed(&mut self) -> Result<(), TreeError> {
+        while let Some(&Pending { slot, node, needed, .. }) = self.stack.last() {
+            let slot = if slot == Slot::NONE { self.front.find(self.tree, node) } else { slot };
+            if self.front.node(slot) == node && self.front.record(slot).is_active() {
+                self.stack.pop();
+                continue;
+            }
+            if !is_boundary(self.front, (slot, node)) {
+                // A needed node below folded ones: its ancestors come first.
+                let above = self.stack.len();
+                let (front, tree) = (&*self.front, &*self.tree);
+                let is_folded = |p: &NodeId| !front.record(front.find(tree, *p)).is_active();
+                self.stack.extend(tree.parents(node).filter(is_folded).map(Pending::needed));
+                if (above..self.stack.len()).any(|at| self.waits(self.stack[at].node)) {
+                    self.give_up();
+                } else {
+                    self.stack[above - 1].waits = true;
+                }
+                continue;
+            }
+            match self.tree.unfold(node, self.mesh)? {
+                Step::Done => {
+                    self.stack.pop();
+                    if needed && !self.wanted(slot) {
+                        self.counts.forced += 1;
+                    }
+                    self.unfolded(slot);
+                }
+                step => self.wait_or_give_up((slot, node), step),
+            }
+        }
+        Ok(())
+    }
+
+    /// The node on top of the stack has not been unfolded: what it needs goes on top of it, or it is left for later.
+    fn wait_or_give_up(&mut self, (slot, node): Noted, step: Step) {
+        match step {
+            Step::Needs(other) if !self.is_active(other) && !self.waits(other) => {
+                if let Some(pending) = self.stack.last_mut() {
+                    pending.waits = true;
+                }
+                self.stack.push(Pending::needed(other));
+                return;
+            }
+            Step::Blocked => self.blocked.push((slot, node)),
+            Step::Done | Step::Needs(_) | Step::NotResident | Step::StillNeeded => self.missing.push(node),
+        }
+        self.give_up();
+    }
+
+    /// The backend has unfolded a node.
+    #[inline(always)]
+    fn unfolded(&mut self, slot: Slot) {
+        self.counts.unfolds += 1;
+        self.finder.unwatch(slot);
+        for parent in self.front.parents(self.tree, slot) {
+            if self.front.record(parent).is_collapsible() {
+                self.finder.unwatch(parent);
+            }
+        }
+        self.front.set_active(self.tree, slot);
+        self.watch(slot, Kind::Fold);
+        for child in self.front.children(self.tree, slot) {
+            let record = self.front.record(child);
+            if T::IS_TREE || record.is_boundary() {
+                self.tests += 1;
+                if self.frame.unfold(&record.bounds) {
+                    self.unfolding.push((child, record.node));
+                } else {
+                    self.finder.watch(self.frame, child, Kind::Unfold, record.bounds);
+                }
+            }
+        }
+    }
+
+    fn is_active(&self, node: NodeId) -> bool {
+        self.front.record(self.front.find(self.tree, node)).is_active()
+    }
+
+    /// Whether a node waits for the one on top of the stack, directly or by way of others. To need it then is a cycle
+    /// of dependencies, which can only come from a damaged store.
+    fn waits(&self, node: NodeId) -> bool {
+        // What lies below an entry that nobody needs only waits for its turn.
+        let last = self.stack.iter().rposition(|pending| !pending.needed).unwrap_or(0);
+        self.stack[last..].iter().any(|pending| pending.waits && pending.node == node)
+    }
+
+    /// The node on top of the stack can not be unfolded in this frame, and with it nothing that waits for it.
+    fn give_up(&mut self) {
+        while let Some(Pending { slot, node, needed, .. }) = self.stack.pop() {
+            let slot = if slot == Slot::NONE { self.front.find(self.tree, node) } else { slot };
+            if is_boundary(self.front, (slot, node)) {
+                self.refused(slot, Kind::Unfold);
+            }
+            if !needed {
+                break;
+            }
+        }
+    }
+}
+
+/// Looks up the nodes in some slots, before anything changes.
+pub(super) fn note(front: &Front, slots: &[Slot], noted: &mut Vec<Noted>) {
+    noted.clear();
+    for slots in slots.chunks(32) {
+        slots.iter().for_each(|&slot| front.prefetch(slot));
+        noted.extend(slots.iter().map(|&slot| (slot, front.node(slot))));
+    }
+}
+
+/// Whether a node that was noted is still in its slot and collapsible.
+#[inline(always)]
+fn is_collapsible(front: &Front, (slot, node): Noted) -> bool {
+    let record = front.record(slot);
+    record.node == node && record.is_collapsible()
+}
+
+/// Whether a node that was noted is still in its slot and a boundary node.
+#[inline(always)]
+fn is_boundary(front: &Front, (slot, node): Noted) -> bool {
+    let record = front.record(slot);
+    record.node == node && record.is_boundary()
+}
