@@ -160,9 +160,12 @@ fn a_store_that_fails_now_and_then() {
             faulty.set(faults);
             let mut walk = Walk::new(seed as u64, 300.0);
             let mut counted = 0;
-            for _ in 0..150 {
+            // Reads that take long are few: the walk goes on until one of them has been befallen.
+            let mut frames = 0;
+            while frames < 150 || (faulty.befallen() == before && frames < 20_000) {
                 counted += engine.advance(&walk.step()).unwrap().pages.faults;
                 std::thread::sleep(Duration::from_micros(200));
+                frames += 1;
             }
             faulty.set(Faults::default());
             let views = walk.step();
