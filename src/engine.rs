@@ -100,7 +100,7 @@ pub struct FrameReport {
     pub forced: u64,
     /// Wanted changes left to later frames by the cap on work.
     pub carried: u64,
-    /// Wanted changes that a rule of the backend's own forbade, see [`Step::Blocked`].
+    /// Wanted changes that a rule of the backend's own forbade, see [`Step::Blocked`](vertex_tree::Step::Blocked).
     pub blocked: u64,
     /// Wanted changes that the backend refused for want of a page.
     pub misses: u64,

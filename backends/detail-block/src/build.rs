@@ -98,7 +98,7 @@ impl Arrangement {
     /// Arranges a log.
     ///
     /// # Errors
-    /// As for [`write`], except for writing.
+    /// As for [`write()`], except for writing.
     pub fn new(log: &CollapseLog, options: &BuildOptions) -> Result<Self, XfmError> {
         log.forest()?;
         let levels = Levels::new(options.levels)
