@@ -49,8 +49,17 @@ impl<T: VertexTree> VertexTree for Settled<T> {
     fn prepare<M: MeshSink>(&self, node: NodeId, step: usize, mesh: &M) {
         self.0.prepare(node, step, mesh);
     }
-    fn will_need(&mut self, node: NodeId, ticks: u32) {
-        self.0.will_need(node, ticks);
+    fn look_ahead(&self) -> u32 {
+        self.0.look_ahead()
+    }
+    fn will_need(&mut self, node: NodeId, frames: u32) {
+        self.0.will_need(node, frames);
+    }
+    fn peek(&self, node: NodeId, children: &mut Vec<(NodeId, Bounds)>) -> bool {
+        self.0.peek(node, children)
+    }
+    fn pass(&mut self, time: std::time::Duration) -> Result<(), TreeError> {
+        self.0.pass(time)
     }
     fn children(&self, node: NodeId) -> impl Iterator<Item = NodeId> {
         self.0.children(node)

@@ -48,6 +48,40 @@ pub struct PageStats {
     pub resident_bytes: u64,
     /// Reads since the last call that failed, or brought a damaged page. They are tried again.
     pub faults: u64,
+    /// Those of the reads that no refused change had asked for: pages fetched ahead.
+    pub ahead: u64,
+    /// Pages fetched ahead that a change has used since the last call, each counted once, the first time.
+    pub ahead_used: u64,
+    /// Changes refused since the last call because what is in memory could not make room, not because the store is
+    /// slow.
+    pub no_room: u64,
+}
+
+/// What fetches pages before a change needs them.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
+pub enum Prefetch {
+    /// The published scheme of the backend, made asynchronous where it is not.
+    #[default]
+    Paper,
+    /// What the engine foresees, see [`VertexTree::will_need`].
+    Schedule,
+    /// Nothing: a page is fetched when a change has been refused for want of it.
+    None,
+}
+
+impl Prefetch {
+    /// All of them, in the order of reports.
+    pub const ALL: [Self; 3] = [Self::Paper, Self::Schedule, Self::None];
+
+    /// The name on the command line and in files.
+    #[must_use]
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Paper => "paper",
+            Self::Schedule => "schedule",
+            Self::None => "none",
+        }
+    }
 }
 
 /// A backend can not go on: its store failed in a way that asking again will not mend.
@@ -137,9 +171,33 @@ pub trait VertexTree {
     fn prepare<M: MeshSink>(&self, node: NodeId, step: usize, mesh: &M) {
         let _ = (node, step, mesh);
     }
-    /// Says that `node` can not be unfolded before `ticks` ticks of the engine's clock have passed: a prefetch hint.
-    fn will_need(&mut self, node: NodeId, ticks: u32) {
-        let _ = (node, ticks);
+    /// For how many frames ahead the engine shall foresee what changes, and say so through
+    /// [`will_need`](Self::will_need): as many as it takes to fetch a page, and one more; 0 for not at all. Asked in
+    /// every frame, as a store may be slow for a while.
+    fn look_ahead(&self) -> u32 {
+        0
+    }
+    /// Says that `node` is expected to change its status in so many frames, 1 being the next. Called at the end of a
+    /// frame, before [`end_frame`](Self::end_frame), for boundary and collapsible nodes and for what
+    /// [`peek`](Self::peek) has shown below those; in every frame anew, so that what is not named any more is
+    /// not expected any more.
+    fn will_need(&mut self, node: NodeId, frames: u32) {
+        let _ = (node, frames);
+    }
+    /// Appends the children, with their bounds, of a boundary node or of a node that this has appended before. Returns
+    /// whether it could: the page that names them may not be in memory.
+    fn peek(&self, node: NodeId, children: &mut Vec<(NodeId, Bounds)>) -> bool {
+        let _ = (node, children);
+        false
+    }
+    /// Lets time pass for a store on virtual time, see [`simulated`](crate::simulated): called between frames by
+    /// whoever plays the clock. What has arrived by then is there in the next [`begin_frame`](Self::begin_frame).
+    ///
+    /// # Errors
+    /// Those of [`begin_frame`](Self::begin_frame).
+    fn pass(&mut self, time: std::time::Duration) -> Result<(), TreeError> {
+        let _ = time;
+        Ok(())
     }
     /// Starts a frame. Appends to `arrived` the nodes for which a [`Step::NotResident`] was answered and that can
     /// be asked again.
