@@ -5,6 +5,9 @@ use vertex_tree::{NONE, NodeId, PageStats};
 use crate::block::resident_bytes;
 use crate::paging::{Paging, SOON, Stub};
 
+/// What a change has missed is needed in so many frames.
+pub(crate) const NOW: u32 = 0;
+
 impl Paging {
     /// A block may have become a candidate for removal.
     pub fn may_go(&mut self, number: u32) {
@@ -39,7 +42,7 @@ impl Paging {
     }
 
     /// Of the candidates that are out of play, or of those in play, the one that was used least recently, taken out of its
-    /// queue, if nothing has used it since a frame.
+    /// queue, if nothing has used it since a frame or will as far as can be foreseen.
     fn next_candidate(&mut self, in_play: bool, unused_since: u64) -> Option<u32> {
         let which = usize::from(in_play);
         while let Some(&(stamp, number)) = self.candidates[which].front() {
@@ -53,7 +56,7 @@ impl Paging {
                 continue;
             }
             let is_unused = self.block(number).is_some_and(|block| block.used < unused_since);
-            if is_unused && self.is_in_play(number) == in_play {
+            if is_unused && self.is_in_play(number) == in_play && !self.foresight.holds(number) {
                 return Some(number);
             }
             self.may_go(number);
@@ -61,9 +64,20 @@ impl Paging {
         None
     }
 
-    /// A candidate to make room below the hard quota: one in play if there is no other.
-    fn any_candidate(&mut self) -> Option<u32> {
-        self.next_candidate(false, self.frame).or_else(|| self.next_candidate(true, self.frame))
+    /// A candidate to make room below the hard quota for what is needed in so many frames: one in play if there is no
+    /// other, and one that is foreseen if there is none of those either.
+    fn any_candidate(&mut self, unused_since: u64, due: u32) -> Option<u32> {
+        let unforeseen = self.next_candidate(false, unused_since);
+        if let Some(number) = unforeseen.or_else(|| self.next_candidate(true, unused_since)) {
+            return Some(number);
+        }
+        while let Some(number) = self.foresight.farthest(due) {
+            let is_unused = self.block(number).is_some_and(|block| block.used < unused_since);
+            if is_unused && self.is_candidate(number) {
+                return Some(number);
+            }
+        }
+        None
     }
 
     fn remove(&mut self, number: u32) {
@@ -87,10 +101,20 @@ impl Paging {
         }
     }
 
-    /// Makes room for so many bytes below the hard quota.
-    pub fn make_room(&mut self, bytes: u64) -> bool {
-        while (self.bytes + self.reserved).saturating_add(bytes) > self.hard {
-            match self.any_candidate() {
+    /// Makes room below the hard quota for so many bytes, which are needed in so many frames.
+    ///
+    /// What a change has made use of in the last frame stays: a change that waits for more than one block asks for them in
+    /// every frame, so that what has come for it is still there when the rest does. With a camera at rest a block that
+    /// has come for a change is thus not removed for another, and as every change that is made lets the front sink,
+    /// loading comes to an end, whatever the quota.
+    pub fn make_room(&mut self, bytes: u64, due: u32) -> bool {
+        let fits = |paging: &Self| (paging.bytes + paging.reserved).saturating_add(bytes) <= paging.hard;
+        while !fits(self) {
+            // What has not been started takes no room from what is missed.
+            if due == NOW && self.withdraw() {
+                continue;
+            }
+            match self.any_candidate(self.frame.saturating_sub(1), due) {
                 Some(number) => self.remove(number),
                 None => return false,
             }
@@ -101,7 +125,7 @@ impl Paging {
     /// Removes candidates beyond the quotas.
     pub fn end_frame(&mut self) -> PageStats {
         while self.bytes + self.reserved > self.hard
-            && let Some(number) = self.any_candidate()
+            && let Some(number) = self.any_candidate(self.frame, NOW)
         {
             self.remove(number);
         }
