@@ -80,9 +80,8 @@ fn what_is_removed_is_not_wanted_again_soon() {
                 "{}: {percent:.2} % again soon, {beyond} frames beyond the quota, {counts:?}",
                 path.name
             );
-            // What the laserscan's path shows takes five times the quota: there it is twice the 5 % aimed at.
-            let most = if kind == SceneKind::Laserscan { 11.0 } else { 5.0 };
-            assert!(percent < most, "{}: {percent} % again soon; {counts:?}", path.name);
+            assert!(percent < 5.0, "{}: {percent} % again soon; {counts:?}", path.name);
+            assert!(counts.removals > 5000, "{}: {counts:?}", path.name);
         }
     }
 }

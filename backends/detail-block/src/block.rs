@@ -56,6 +56,8 @@ pub(crate) struct Block {
     /// When it became a candidate for removal, in frames, and the last frame that made use of it.
     pub stamp: u64,
     pub used: u64,
+    /// When it left play, 0 while it has not.
+    pub left: u64,
     pub nodes: Box<[Node]>,
 }
 
@@ -133,6 +135,7 @@ impl Block {
             is_unused: false,
             stamp: 0,
             used: 0,
+            left: 0,
             nodes,
         })
     }

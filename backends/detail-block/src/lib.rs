@@ -42,6 +42,7 @@ mod quantize;
 mod removal;
 mod replay;
 mod requests;
+mod returns;
 mod settings;
 mod shown;
 mod split_apart;

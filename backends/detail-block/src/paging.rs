@@ -29,6 +29,7 @@ use crate::file::XfmFile;
 use crate::foresight::Foresight;
 use crate::loader::{Answer, Loader};
 use crate::requests::tree_error;
+use crate::returns::Returns;
 use crate::settings::Settings;
 
 /// How many times in a row reading a block may fail before that is an error of the tree.
@@ -82,11 +83,13 @@ pub(crate) struct Paging {
     pub stubs: FxHashMap<u32, Stub>,
     pub pending: FxHashMap<u32, Pending>,
     pub failures: FxHashMap<u32, u32>,
-    pub removed_at: FxHashMap<u32, u64>,
+    /// When blocks were removed lately, and had left play.
+    pub removed_at: FxHashMap<u32, (u64, u64)>,
     pub removed: VecDeque<(u64, u32)>,
     /// `None` where loading blocks.
     pub loader: Option<Loader>,
     pub foresight: Foresight,
+    pub returns: Returns,
     pub soft: u64,
     pub hard: u64,
     pub grace: u64,
@@ -114,6 +117,7 @@ impl Paging {
             removed: VecDeque::new(),
             loader,
             foresight: Foresight::default(),
+            returns: Returns::default(),
             soft: settings.soft_quota,
             hard: settings.hard_quota,
             grace: settings.grace.into(),
@@ -192,8 +196,12 @@ impl Paging {
         let frame = self.frame;
         if let Some(block) = self.block_mut(number) {
             block.used = frame;
+            let left = std::mem::take(&mut block.left);
             if std::mem::take(&mut block.is_unused) {
                 self.stats.ahead_used += 1;
+            }
+            if left != 0 {
+                self.returns.back(left);
             }
         }
     }
@@ -206,8 +214,11 @@ impl Paging {
         self.bytes += resident_bytes(block.nodes.len() as u32);
         self.directory[number as usize] = self.loaded.insert(block) as u32;
         self.counts.loads += 1;
-        if self.removed_at.get(&number).is_some_and(|&at| self.frame - at <= SOON) {
+        if let Some(&(at, left)) = self.removed_at.get(&number)
+            && self.frame - at <= SOON
+        {
             self.counts.soon_again += 1;
+            self.returns.back(left);
         }
         self.may_go(number);
     }

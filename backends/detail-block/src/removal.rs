@@ -13,11 +13,19 @@ impl Paging {
     pub fn may_go(&mut self, number: u32) {
         if self.is_candidate(number) {
             let frame = self.frame;
+            let in_play = self.is_in_play(number);
+            let mut leaves = false;
             if let Some(block) = self.block_mut(number) {
                 block.stamp = frame;
+                leaves = !in_play && block.left == 0;
+                if leaves {
+                    block.left = frame;
+                }
             }
-            let which = usize::from(self.is_in_play(number));
-            self.candidates[which].push_back((frame, number));
+            if leaves {
+                self.returns.left(frame);
+            }
+            self.candidates[usize::from(in_play)].push_back((frame, number));
         }
     }
 
@@ -64,6 +72,13 @@ impl Paging {
         None
     }
 
+    /// Whether the candidate whose turn it is beyond the soft quota is expected back soon. Those behind it left later.
+    fn expects_next(&self) -> bool {
+        let Some(&(stamp, number)) = self.candidates[0].front() else { return false };
+        let next = self.block(number).filter(|block| block.stamp == stamp && block.left != 0);
+        next.is_some_and(|block| self.returns.expects(block.left, self.frame, self.grace))
+    }
+
     /// A candidate to make room below the hard quota for what is needed in so many frames: one in play if there is no
     /// other, and one that is foreseen if there is none of those either.
     fn any_candidate(&mut self, unused_since: u64, due: u32) -> Option<u32> {
@@ -89,7 +104,7 @@ impl Paging {
             self.stubs.insert(number, stub);
         }
         self.counts.removals += 1;
-        self.removed_at.insert(number, self.frame);
+        self.removed_at.insert(number, (self.frame, block.left));
         self.removed.push_back((self.frame, number));
     }
 
@@ -129,16 +144,18 @@ impl Paging {
         {
             self.remove(number);
         }
-        while self.bytes > self.soft
-            && let Some(number) = self.next_candidate(false, self.frame.saturating_sub(self.grace))
-        {
+        while self.bytes > self.soft && !self.expects_next() {
+            let Some(number) = self.next_candidate(false, self.frame.saturating_sub(self.grace)) else {
+                break;
+            };
             self.remove(number);
         }
+        self.returns.end_frame(self.frame, self.grace);
         while let Some(&(at, number)) = self.removed.front()
             && at + SOON < self.frame
         {
             self.removed.pop_front();
-            if self.removed_at.get(&number) == Some(&at) {
+            if self.removed_at.get(&number).is_some_and(|&(last, _)| last == at) {
                 self.removed_at.remove(&number);
             }
         }

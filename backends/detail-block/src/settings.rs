@@ -28,8 +28,9 @@ pub struct Settings {
     /// Bytes of blocks that are never exceeded.
     pub hard_quota: u64,
     /// Frames for which a block that has become a candidate for removal stays all the same, as far as the hard quota lets
-    /// it. Where what is displayed takes more than the soft quota, the least recently used block is one that has just
-    /// been used, and without this it is often read again soon.
+    /// it; twice [`SOON`](crate::SOON) longer at most where it is expected back soon. Where what is displayed takes more
+    /// than the soft quota, the least recently used block is one that has just been used, and without this it is often
+    /// read again soon.
     pub grace: u32,
 }
 
@@ -41,7 +42,7 @@ impl Default for Settings {
             prefetch: Prefetch::Paper,
             soft_quota: u64::MAX,
             hard_quota: u64::MAX,
-            grace: 60,
+            grace: 180,
         }
     }
 }
