@@ -120,7 +120,7 @@ fn views(path: &Path) -> Vec<View> {
 }
 
 fn tree(file: &Arc<MtFile>, cache: CacheMode) -> MtTree {
-    let settings = mt_partition::Settings { cache, memory: Memory::default(), reader: None };
+    let settings = mt_partition::Settings { cache, ..Default::default() };
     MtTree::new(file.clone(), settings).expect("no limit of memory")
 }
 
