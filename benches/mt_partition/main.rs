@@ -27,7 +27,7 @@ use foldfront::view::{Camera, View, theta_of_pixels};
 use foldfront::{CollapseLog, Mesh, mesh_io, simplify};
 use glam::DVec3;
 use in_memory::{Hierarchy, InMemoryTree};
-use mt_partition::{BuildOptions, CacheMode, Memory, MtFile, MtTree, WriteReport};
+use mt_partition::{BuildOptions, CacheMode, MtFile, MtTree, WriteReport};
 
 fn main() {
     let words: Vec<String> = std::env::args().skip(1).filter(|a| !a.starts_with("--")).collect();
