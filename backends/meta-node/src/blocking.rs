@@ -33,7 +33,7 @@ pub(crate) struct Blocking {
     pub blocks: Vec<u32>,
     pub pages: Vec<PageNodes>,
     pub root_pages: u32,
-    /// The number of each node of the log.
+    /// The number of each node in the file.
     pub number: Vec<NodeId>,
 }
 
@@ -74,7 +74,7 @@ fn size(arrangement: &Arrangement, top: u32, levels: u32) -> Size {
     let (mut nodes, mut links, mut triangles) = (0, 0, 0);
     let count = |n: u32| {
         nodes += 1;
-        triangles += arrangement.brought(n).len();
+        triangles += arrangement.node(n).brought.len();
     };
     walk(arrangement, top, levels, count, |_| links += 1);
     Size { nodes, words: page::block_words(nodes, links, triangles) }
@@ -113,7 +113,7 @@ impl Blocking {
             blocks: Vec::new(),
             pages: Vec::new(),
             root_pages: 0,
-            number: vec![NodeId(NONE); arrangement.spans.len()],
+            number: vec![NodeId(NONE); arrangement.nodes as usize],
         };
         let room = Size { nodes: 1 << slot_bits, words: page_bytes as usize / 4 };
         blocking.pack(arrangement, &arrangement.roots, NONE, room);

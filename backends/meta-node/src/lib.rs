@@ -31,14 +31,16 @@ mod format;
 mod lists;
 mod page;
 mod pager;
+mod subtree;
 mod tree;
 mod verify;
 mod write;
 
+pub use arrange::Workspace;
 pub use dependencies::Dependencies;
 pub use error::MetaNodeError;
 pub use file::MetaNodeFile;
 pub use format::MAGIC;
 pub use pager::InUse;
 pub use tree::{MetaNodeTree, Settings};
-pub use write::{BuildOptions, WriteReport, write};
+pub use write::{BuildOptions, WriteReport, write, write_within};
