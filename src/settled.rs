@@ -63,7 +63,7 @@ impl<T: VertexTree> VertexTree for Settled<T> {
         self.tree.children_and_bounds(node)
     }
     fn normal_cone(&self, node: NodeId) -> NormalCone {
-        self.0.normal_cone(node)
+        self.tree.normal_cone(node)
     }
     fn prepare<M: MeshSink>(&self, node: NodeId, step: usize, mesh: &M) {
         self.tree.prepare(node, step, mesh);
