@@ -170,7 +170,7 @@ impl Writer<'_> {
         let slot = |n: u32| blocking.number[n as usize].0 & ((1 << blocking.slot_bits) - 1);
         let mut nodes = Vec::new();
         for &top in tops {
-            blocking::walk(arrangement, top, blocking.levels, |n| nodes.push(n), |_| ());
+            blocking.walk(arrangement, top, |n| nodes.push(n));
         }
         words.extend([0; page::HEADER_WORDS]);
         let (mut links, mut triangles) = (Vec::new(), 0);
@@ -183,7 +183,7 @@ impl Writer<'_> {
             words.extend([node.span.first, node.span.pivot, node.log_number]);
             let [kept, removed] = node.span.children(n).map(|child| match child {
                 NONE => Child::Leaf.encode(),
-                // Blocks that share a page hang below another page: a child here is in the same block.
+                // Blocks that share a page hang below another page: a child here is in the same block, or in one joined to it.
                 child if is_here(child) => Child::Slot(slot(child)).encode(),
                 child => {
                     links.push(child);
