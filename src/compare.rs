@@ -243,7 +243,7 @@ macro_rules! with_trees {
                 let settings = meta_node::Settings { page_memory, dependencies, ..Default::default() };
                 let $open = || {
                     let tree = MetaNodeTree::new(file.clone(), settings);
-                    tree.map(Settled).map_err(|e| subject.store_error(e.into()))
+                    tree.map(Settled::new).map_err(|e| subject.store_error(e.into()))
                 };
                 $body
             }
@@ -253,16 +253,17 @@ macro_rules! with_trees {
                 let settings = detail_block::Settings { soft_quota, hard_quota, ..Default::default() };
                 let $open = || {
                     let tree = XfmTree::new(file.clone(), settings);
-                    tree.map(Settled).map_err(|e| subject.store_error(e.into()))
+                    tree.map(Settled::new).map_err(|e| subject.store_error(e.into()))
                 };
                 $body
             }
             Store::MtPartition(file) => {
                 let $open = || {
                     let memory = Memory::new(paging.page_memory);
-                    let settings = mt_partition::Settings { cache: paging.cache, memory, reader: None };
+                    let settings =
+                        mt_partition::Settings { cache: paging.cache, memory, ..Default::default() };
                     let tree = MtTree::new(file.clone(), settings);
-                    tree.map(Settled).map_err(|e| subject.store_error(e.into()))
+                    tree.map(Settled::new).map_err(|e| subject.store_error(e.into()))
                 };
                 $body
             }

@@ -17,6 +17,7 @@ use vertex_tree::{MeshSink, NodeId, PageStats, TreeError, VertexTree};
 use self::changes::{Counts, Noted, Pending, Steps, Urgent};
 use crate::budget::{Budget, Steering, WorkCap};
 use crate::criterion::Criterion;
+use crate::foresight::{Foresight, Watched};
 use crate::front::Front;
 use crate::motion::{Odometer, Speed};
 use crate::queue::Kind;
@@ -63,6 +64,8 @@ pub enum Limit {
     Triangles,
     /// The frame-time budget.
     Time,
+    /// Pages that were not in memory, and for which what is there can not make room.
+    Memory,
     /// Pages that were not in memory.
     Io,
     /// The cap on a frame's work.
@@ -77,6 +80,7 @@ impl Limit {
             Self::Error => "error",
             Self::Triangles => "triangles",
             Self::Time => "time",
+            Self::Memory => "memory",
             Self::Io => "io",
             Self::Work => "work",
         }
@@ -104,6 +108,8 @@ pub struct FrameReport {
     pub blocked: u64,
     /// Wanted changes that the backend refused for want of a page.
     pub misses: u64,
+    /// Nodes that the backend was told to expect a change of, see [`VertexTree::will_need`].
+    pub foreseen: u64,
     /// Active nodes at the end.
     pub active_nodes: u64,
     /// Triangles displayed at the end.
@@ -140,6 +146,7 @@ pub struct Engine<T, M> {
     urgent: [BinaryHeap<Urgent>; 2],
     arrived: Vec<NodeId>,
     drawing_time: Duration,
+    foresight: Foresight,
 }
 
 impl<T: VertexTree, M: MeshSink> Engine<T, M> {
@@ -183,6 +190,7 @@ impl<T: VertexTree, M: MeshSink> Engine<T, M> {
             urgent: Default::default(),
             arrived: Vec::new(),
             drawing_time: Duration::ZERO,
+            foresight: Foresight::default(),
         })
     }
 
@@ -306,11 +314,23 @@ impl<T: VertexTree, M: MeshSink> Engine<T, M> {
         let apply = found.elapsed();
         self.finder.settle(&frame);
         applied?;
+        let foreseen = match self.tree.look_ahead() {
+            0 => {
+                self.foresight.skip();
+                0
+            }
+            look_ahead => {
+                let unfinished = misses > 0 || counts.carried > 0;
+                let watched = Watched { front: &self.front, finder: &self.finder };
+                self.foresight.look(&mut self.tree, watched, &frame, &self.before, look_ahead, unfinished)
+            }
+        };
         let pages = self.tree.end_frame()?;
         let select = start.elapsed();
 
         let triangles = self.tree.displayed_triangles();
         let limit = match self.steering.budget() {
+            _ if misses > 0 && pages.no_room > 0 => Limit::Memory,
             _ if misses > 0 => Limit::Io,
             _ if counts.carried > 0 => Limit::Work,
             Budget::Triangles(_) if self.steering.limits() => Limit::Triangles,
@@ -330,6 +350,7 @@ impl<T: VertexTree, M: MeshSink> Engine<T, M> {
             carried: counts.carried,
             blocked,
             misses,
+            foreseen,
             active_nodes: self.front.active_nodes() as u64,
             triangles,
             cut_hash: self.front.cut_hash(),

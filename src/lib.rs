@@ -71,6 +71,7 @@ pub mod cut;
 pub mod deviation;
 pub mod engine;
 mod filter;
+mod foresight;
 pub mod front;
 mod frustum;
 pub mod mesh_io;

@@ -243,6 +243,16 @@ impl Wheel {
         }
     }
 
+    /// The buckets that an advance to `now` would reach.
+    fn due_within(&self, now: f64) -> impl Iterator<Item = Bucket> + '_ {
+        let last = (now * TICKS_PER_FRAME) as u64;
+        self.levels.iter().zip(0..).flat_map(move |(slots, level)| {
+            // The present slot of a wider level has been drained.
+            let (first, last) = ((self.tick >> level) + u64::from(level > 0), last >> level);
+            (first..=last.min(first + SLOTS - 1)).map(move |slot| slots[(slot % SLOTS) as usize])
+        })
+    }
+
     /// Moves the buckets in some slots of a level, one bit each.
     fn take(&mut self, level: usize, slots: u16, ripe: &mut Vec<Bucket>) {
         let mut slots = slots & self.occupied[level];
@@ -421,6 +431,29 @@ impl EventQueue {
     #[must_use]
     pub fn is_idle(&self, clock: usize) -> bool {
         self.wheels[clock].occupied == [0; LEVELS]
+    }
+
+    /// Calls `f` with every event that an advance of a clock to `now` would let come up.
+    pub(crate) fn due_within(&self, clock: usize, now: f64, mut f: impl FnMut(&Event)) {
+        self.wheels[clock].due_within(now).for_each(|bucket| self.read(bucket, &mut f));
+    }
+
+    /// Calls `f` with every event that comes up at the next advance of any clock, moved or not.
+    pub(crate) fn pressing(&self, mut f: impl FnMut(&Event)) {
+        self.read(self.pressing, &mut f);
+    }
+
+    fn read(&self, mut bucket: Bucket, f: &mut impl FnMut(&Event)) {
+        while bucket != 0 {
+            let chunk = (bucket - 1) / CHUNK;
+            let used = (bucket - chunk * CHUNK) as usize;
+            self.pool.chunks[chunk as usize][..used]
+                .iter()
+                .filter(|event| self.is_valid(event))
+                .for_each(&mut *f);
+            let previous = self.pool.previous[chunk as usize];
+            bucket = if previous == 0 { 0 } else { (previous + 1) * CHUNK };
+        }
     }
 
     /// Lets every event on one clock come up: for a motion that its speeds do not cover.

@@ -196,6 +196,25 @@ impl EventDriven {
             None => process_plainly(&mut self.queue, &bench, next, flip),
         }
     }
+
+    /// Calls `f` with the events that may have to be tested at one of several instants: `travels` says how the views get
+    /// there, `None` if that can not be compared. Clocks that run on net displacement have reached them at none of these.
+    pub fn for_each_due<'a, I: Iterator<Item = Option<Travel<'a>>>>(
+        &self,
+        travels: impl Fn() -> I,
+        mut f: impl FnMut(&Event),
+    ) {
+        self.queue.pressing(&mut f);
+        for (number, clock) in
+            self.clocks.iter().enumerate().filter(|&(number, _)| !self.queue.is_idle(number))
+        {
+            let reached = |travel: Option<Travel>| {
+                travel.map_or(f64::INFINITY, |travel| clock.odometer.after(&clock.course, &travel))
+            };
+            let now = travels().map(reached).fold(clock.odometer.now(), f64::max);
+            self.queue.due_within(number, now, &mut f);
+        }
+    }
 }
 
 impl Watch for EventDriven {

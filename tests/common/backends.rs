@@ -47,11 +47,13 @@ const BACKENDS: [(&str, Open); 6] = [
     // The multi-triangulation as it is, whose nodes are the collapses, and reduced, where they are groups of them.
     ("mt-partition unreduced", |log, settings| {
         let file = graph_cut::file(log, &BuildOptions { patch: 0.0, ..BuildOptions::default() });
-        follow(settings, || Settled(MtTree::new(file.clone(), mt_partition::Settings::default()).unwrap()))
+        follow(settings, || {
+            Settled::new(MtTree::new(file.clone(), mt_partition::Settings::default()).unwrap())
+        })
     }),
     ("mt-partition", |log, settings| {
         let file = graph_cut::file(log, &BuildOptions::default());
-        let tree = || Settled(MtTree::new(file.clone(), mt_partition::Settings::default()).unwrap());
+        let tree = || Settled::new(MtTree::new(file.clone(), mt_partition::Settings::default()).unwrap());
         let engine = |&settings: &Settings| Engine::new(tree(), NullSink, settings).unwrap();
         let cut = Rc::new(RefCell::new(GraphCut::new(&file)));
         let own = |settings| OwnGraph { engine: engine(settings), cut: cut.clone() };
