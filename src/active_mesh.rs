@@ -10,7 +10,9 @@ use vertex_tree::{Mesh, MeshSink, NONE, TriangleId, VertexId, prefetch};
 /// A slot of one of the buffers is named at most once among the changes.
 #[derive(Clone, Debug, Default)]
 struct Changes {
+    /// The named ones are the first `count`. There is a place for every slot.
     slots: Vec<u32>,
+    count: usize,
     /// A bit a slot: whether it is named. Small enough to stay in the nearest cache.
     is_named: Vec<u64>,
 }
@@ -20,18 +22,27 @@ impl Changes {
     fn note(&mut self, slot: u32) {
         let (word, bit) = (slot as usize / 64, 1 << (slot % 64));
         if self.is_named.len() <= word {
-            self.is_named.resize(word + 1, 0);
+            self.is_named.resize(2 * word + 2, 0);
+            self.slots.resize(64 * self.is_named.len(), 0);
         }
-        if self.is_named[word] & bit == 0 {
-            self.is_named[word] |= bit;
-            self.slots.push(slot);
+        // Written whether it is named already or not: only the count depends on that, so there is no branch.
+        let is_new = self.is_named[word] & bit == 0;
+        self.is_named[word] |= bit;
+        if let Some(place) = self.slots.get_mut(self.count) {
+            *place = slot;
         }
+        self.count += usize::from(is_new);
+    }
+
+    fn named(&self) -> &[u32] {
+        &self.slots[..self.count]
     }
 
     fn clear(&mut self) {
-        for slot in self.slots.drain(..) {
+        for &slot in &self.slots[..self.count] {
             self.is_named[slot as usize / 64] = 0;
         }
+        self.count = 0;
     }
 }
 
@@ -88,14 +99,14 @@ impl ActiveMesh {
     /// Slots of the vertex buffer that have changed since the changes were cleared, each once.
     #[must_use]
     pub fn changed_vertices(&self) -> &[u32] {
-        &self.changed_vertices.slots
+        self.changed_vertices.named()
     }
 
     /// Slots of the index buffer that have changed since the changes were cleared, each once. Slots at and beyond
     /// `triangles().len()` are no longer used.
     #[must_use]
     pub fn changed_triangles(&self) -> &[u32] {
-        &self.changed_triangles.slots
+        self.changed_triangles.named()
     }
 
     /// Starts collecting changes anew: everything up to now has been uploaded.

@@ -14,14 +14,14 @@ use std::time::{Duration, Instant};
 
 use vertex_tree::{MeshSink, NodeId, PageStats, TreeError, VertexTree};
 
-use self::changes::{Counts, Noted, Pending, Steps, Urgent, note};
+use self::changes::{Counts, Noted, Pending, Steps, Urgent};
 use crate::budget::{Budget, Steering, WorkCap};
 use crate::criterion::Criterion;
 use crate::foresight::{Foresight, Watched};
 use crate::front::Front;
 use crate::motion::{Odometer, Speed};
 use crate::queue::Kind;
-use crate::refine::{Finder, Flips, Frame, Strategy};
+use crate::refine::{Finder, Flips, Frame, Strategy, Watch, with_strategy};
 use crate::view::View;
 
 /// How an engine refines.
@@ -165,7 +165,7 @@ impl<T: VertexTree, M: MeshSink> Engine<T, M> {
             motion: crate::motion::Motion::Unbounded,
         };
         for root in front.roots() {
-            finder.watch(&frame, root, Kind::Unfold, front.bounds(root));
+            with_strategy!(&mut finder, |s| s.watch(&frame, root, Kind::Unfold, front.bounds(root)));
         }
         tree.base_mesh(&mut mesh)?;
         Ok(Self {
@@ -285,35 +285,26 @@ impl<T: VertexTree, M: MeshSink> Engine<T, M> {
         self.finder.find(&frame, &self.before, &self.front, &mut self.flips);
 
         let found = Instant::now();
-        let mut step = Steps {
-            tree: &mut self.tree,
-            mesh: &mut self.mesh,
-            front: &mut self.front,
-            finder: &mut self.finder,
-            frame: &frame,
-            stack: &mut self.stack,
-            missing: &mut self.missing,
-            blocked: &mut self.blocked,
-            forbidden: &mut self.forbidden,
-            still_needed: &mut self.still_needed,
-            folding: &mut self.folding,
-            unfolding: &mut self.unfolding,
-            counts: Counts::default(),
-            tests: 0,
-        };
-        step.missing.clear();
-        step.blocked.clear();
-        step.forbidden.clear();
-        note(step.front, &self.flips.fold, step.folding);
-        note(step.front, &self.flips.unfold, step.unfolding);
-        let applied = match self.settings.work_cap {
-            WorkCap::None => step.apply(),
-            cap => step.apply_within(cap, found, &mut self.urgent),
-        };
-        if applied.is_err() {
-            step.abandon();
-        }
-        let (counts, tests) = (step.counts, self.flips.tests + step.tests);
+        let (applied, counts, tests) = with_strategy!(&mut self.finder, |finder| {
+            let mut step = Steps {
+                tree: &mut self.tree,
+                mesh: &mut self.mesh,
+                front: &mut self.front,
+                finder,
+                frame: &frame,
+                stack: &mut self.stack,
+                missing: &mut self.missing,
+                blocked: &mut self.blocked,
+                forbidden: &mut self.forbidden,
+                still_needed: &mut self.still_needed,
+                folding: &mut self.folding,
+                unfolding: &mut self.unfolding,
+                counts: Counts::default(),
+                tests: 0,
+            };
+            let applied = step.carry_out(&self.flips, self.settings.work_cap, found, &mut self.urgent);
+            (applied, step.counts, self.flips.tests + step.tests)
+        });
         let distinct = |nodes: &mut Vec<NodeId>| {
             nodes.sort_unstable();
             nodes.dedup();

@@ -214,6 +214,14 @@ impl Front {
         }
     }
 
+    /// The nodes linked below a node if they are just two, as they mostly are in a tree.
+    #[inline(always)]
+    pub(crate) fn two_below(&self, slot: Slot) -> Option<[Slot; 2]> {
+        let record = self.record(slot);
+        let children = [Slot(2 * record.children), Slot(2 * record.children + 1)];
+        (record.status & MANY == 0 && self.node(children[1]).0 != NONE).then_some(children)
+    }
+
     /// The nodes in play in some pairs.
     fn slots_in<'a>(&'a self, pairs: &'a [u32]) -> impl Iterator<Item = Slot> + 'a {
         let slots = pairs.iter().flat_map(|&pair| [Slot(2 * pair), Slot(2 * pair + 1)]);

@@ -63,6 +63,12 @@ impl Frame<'_> {
     pub fn unfold(&self, bounds: &Bounds) -> bool {
         self.criterion.unfold(self.views, bounds)
     }
+
+    /// The same of two nodes.
+    #[inline(always)]
+    pub fn unfold_both(&self, bounds: [&Bounds; 2]) -> [bool; 2] {
+        self.criterion.unfold_both(self.views, bounds)
+    }
 }
 
 /// Nodes whose status must flip: boundary nodes to unfold, collapsible nodes to fold.
@@ -74,14 +80,52 @@ pub(crate) struct Flips {
     pub tests: u64,
 }
 
-/// A strategy's state. The engine tells it of every node that becomes or ceases to be a boundary node or
-/// collapsible, so that it can watch just these.
+/// A strategy's state, as the part of the engine that carries out changes sees it: that is compiled for each strategy
+/// apart, since several of these calls are made for every change.
+///
+/// The engine tells of every node that becomes or ceases to be a boundary node or collapsible, so that a strategy can
+/// watch just these.
+pub(crate) trait Watch {
+    /// The node has become a boundary node or collapsible; the criterion does not ask for it to change.
+    fn watch(&mut self, frame: &Frame, slot: Slot, kind: Kind, bounds: Bounds);
+
+    /// The node is no longer what it was watched as, if it was watched.
+    fn unwatch(&mut self, slot: Slot);
+
+    /// The node should have changed, but the backend refused for now: it must be found again in the next frame, even
+    /// if nothing moves.
+    fn refused(&mut self, slot: Slot, kind: Kind, bounds: Bounds);
+
+    /// Starts to read into the cache what [`unwatch`](Self::unwatch) and [`watch`](Self::watch) will touch.
+    #[inline(always)]
+    fn prefetch(&self, slot: Slot) {
+        let _ = slot;
+    }
+}
+
+/// The state of whichever strategy it is.
 pub(crate) enum Finder {
     TopDown(top_down::TopDown),
     Front(front::FrontScan),
     Event(Box<event::EventDriven>),
     Published(published::Published),
 }
+
+/// Evaluates `$body` with `$strategy` as the strategy that a [`Finder`] holds.
+macro_rules! with_strategy {
+    ($finder:expr, |$strategy:ident| $body:expr) => {
+        match $finder {
+            $crate::refine::Finder::TopDown($strategy) => $body,
+            $crate::refine::Finder::Front($strategy) => $body,
+            $crate::refine::Finder::Event($strategy) => {
+                let $strategy = &mut **$strategy;
+                $body
+            }
+            $crate::refine::Finder::Published($strategy) => $body,
+        }
+    };
+}
+pub(crate) use with_strategy;
 
 impl Finder {
     pub fn new(strategy: Strategy) -> Self {
@@ -103,51 +147,10 @@ impl Finder {
         }
     }
 
-    /// The node has become a boundary node or collapsible; the criterion does not ask for it to change.
-    #[inline]
-    pub fn watch(&mut self, frame: &Frame, slot: Slot, kind: Kind, bounds: Bounds) {
-        match self {
-            Self::TopDown(_) => {}
-            Self::Front(s) => s.watch(slot, kind, bounds),
-            Self::Event(s) => s.watch(slot, kind, bounds),
-            Self::Published(s) => s.watch(frame, slot, kind, &bounds),
-        }
-    }
-
     /// The frame's changes have been made: whatever has come to be watched stays so.
     pub fn settle(&mut self, frame: &Frame) {
         if let Self::Event(s) = self {
             s.settle(frame);
-        }
-    }
-
-    /// The node is no longer what it was watched as, if it was watched.
-    #[inline]
-    pub fn unwatch(&mut self, slot: Slot) {
-        match self {
-            Self::TopDown(_) => {}
-            Self::Front(s) => s.unwatch(slot),
-            Self::Event(s) => s.unwatch(slot),
-            Self::Published(s) => s.unwatch(slot),
-        }
-    }
-
-    /// Starts to read into the cache what [`unwatch`](Self::unwatch) and [`watch`](Self::watch) will touch.
-    #[inline]
-    pub fn prefetch(&self, slot: Slot) {
-        if let Self::Event(s) = self {
-            s.prefetch(slot);
-        }
-    }
-
-    /// The node should have changed, but the backend refused for now: it must be found again in the next frame, even
-    /// if nothing moves.
-    pub fn refused(&mut self, slot: Slot, kind: Kind, bounds: Bounds) {
-        match self {
-            Self::TopDown(_) => {}
-            Self::Front(s) => s.watch(slot, kind, bounds),
-            Self::Event(s) => s.refused(slot, kind, bounds),
-            Self::Published(s) => s.refused(slot, kind),
         }
     }
 }

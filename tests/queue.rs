@@ -219,6 +219,10 @@ proptest! {
                 Motion::Frames(_) => {}
             }
             let now_active = criterion.unfold(&views, &bounds);
+            // Two at a time, the same is said of each.
+            let other = Bounds { radius: bounds.radius * random.unit() as f32, ..bounds };
+            let both = [now_active, criterion.unfold(&views, &other)];
+            prop_assert_eq!(criterion.unfold_both(&views, [&bounds, &other]), both);
             if now_active != active {
                 prop_assert!(clock.now() >= deadline, "flipped at {}, bound {deadline}", clock.now());
                 active = now_active;

@@ -9,9 +9,9 @@ use std::time::Instant;
 use vertex_tree::{MeshSink, NodeId, Step, TreeError, VertexTree};
 
 use crate::budget::{FOLDING_SHARE, WorkCap};
-use crate::front::{Front, Slot};
+use crate::front::{Front, Record, Slot};
 use crate::queue::Kind;
-use crate::refine::{Finder, Frame};
+use crate::refine::{Flips, Frame, Watch};
 
 /// A node in play and the slot that it was in when this was noted. By the time its turn comes it may have gone out of
 /// play and another node may have come to the slot.
@@ -63,11 +63,11 @@ const TOGETHER: usize = 8;
 const MOST_STEPS: usize = 8;
 
 /// Carries out status changes and what follows from them.
-pub(super) struct Steps<'a, T, M> {
+pub(super) struct Steps<'a, T, M, F> {
     pub tree: &'a mut T,
     pub mesh: &'a mut M,
     pub front: &'a mut Front,
-    pub finder: &'a mut Finder,
+    pub finder: &'a mut F,
     pub frame: &'a Frame<'a>,
     pub stack: &'a mut Vec<Pending>,
     /// Nodes whose change was refused for want of a page; some more than once.
@@ -86,9 +86,32 @@ pub(super) struct Steps<'a, T, M> {
     pub tests: u64,
 }
 
-impl<T: VertexTree, M: MeshSink> Steps<'_, T, M> {
+impl<T: VertexTree, M: MeshSink, F: Watch> Steps<'_, T, M, F> {
+    /// Carries out what a strategy has found, within a cap on work that began at `start`.
+    pub fn carry_out(
+        &mut self,
+        flips: &Flips,
+        cap: WorkCap,
+        start: Instant,
+        urgent: &mut [BinaryHeap<Urgent>; 2],
+    ) -> Result<(), TreeError> {
+        self.missing.clear();
+        self.blocked.clear();
+        self.forbidden.clear();
+        note(self.front, &flips.fold, self.folding);
+        note(self.front, &flips.unfold, self.unfolding);
+        let applied = match cap {
+            WorkCap::None => self.apply(),
+            cap => self.apply_within(cap, start, urgent),
+        };
+        if applied.is_err() {
+            self.abandon();
+        }
+        applied
+    }
+
     /// Folds, then unfolds, and whatever follows.
-    pub fn apply(&mut self) -> Result<(), TreeError> {
+    fn apply(&mut self) -> Result<(), TreeError> {
         self.take_turns(Kind::Fold)?;
         // What a rule forbade when its turn came may have become possible since: to a fixpoint, so that the order in which
         // a strategy finds changes does not matter.
@@ -137,7 +160,7 @@ impl<T: VertexTree, M: MeshSink> Steps<'_, T, M> {
     }
 
     /// The same within a cap, most urgent first. `start` is when the work began.
-    pub fn apply_within(
+    fn apply_within(
         &mut self,
         cap: WorkCap,
         start: Instant,
@@ -189,7 +212,7 @@ impl<T: VertexTree, M: MeshSink> Steps<'_, T, M> {
     }
 
     /// The backend can not go on: whatever was to change is to be looked at again when it can.
-    pub fn abandon(&mut self) {
+    fn abandon(&mut self) {
         let pending = self.stack.drain(..).map(|pending| (pending.slot, pending.node));
         let mut all: Vec<Noted> = pending.chain(self.still_needed.drain(..)).collect();
         all.extend(self.folding.iter().chain(&*self.unfolding));
@@ -381,15 +404,29 @@ impl<T: VertexTree, M: MeshSink> Steps<'_, T, M> {
         }
         self.front.set_active(self.tree, slot);
         self.watch(slot, Kind::Fold);
-        for child in self.front.children(self.tree, slot) {
-            let record = self.front.record(child);
+        let (front, frame) = (&*self.front, self.frame);
+        let mut comes_into_play = |slot: Slot, record: &Record, wanted: bool| {
+            self.tests += 1;
+            if wanted {
+                self.unfolding.push((slot, record.node));
+            } else {
+                self.finder.watch(frame, slot, Kind::Unfold, record.bounds);
+            }
+        };
+        if T::IS_TREE
+            && let Some(children) = front.two_below(slot)
+        {
+            // The rule, and worth tests two at a time.
+            let [a, b] = children.map(|child| front.record(child));
+            let wanted = frame.unfold_both([&a.bounds, &b.bounds]);
+            comes_into_play(children[0], a, wanted[0]);
+            comes_into_play(children[1], b, wanted[1]);
+            return;
+        }
+        for child in front.children(self.tree, slot) {
+            let record = front.record(child);
             if T::IS_TREE || record.is_boundary() {
-                self.tests += 1;
-                if self.frame.unfold(&record.bounds) {
-                    self.unfolding.push((child, record.node));
-                } else {
-                    self.finder.watch(self.frame, child, Kind::Unfold, record.bounds);
-                }
+                comes_into_play(child, record, frame.unfold(&record.bounds));
             }
         }
     }
@@ -421,7 +458,7 @@ impl<T: VertexTree, M: MeshSink> Steps<'_, T, M> {
 }
 
 /// Looks up the nodes in some slots, before anything changes.
-pub(super) fn note(front: &Front, slots: &[Slot], noted: &mut Vec<Noted>) {
+fn note(front: &Front, slots: &[Slot], noted: &mut Vec<Noted>) {
     noted.clear();
     for slots in slots.chunks(32) {
         slots.iter().for_each(|&slot| front.prefetch(slot));

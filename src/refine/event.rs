@@ -16,7 +16,7 @@ use glam::DVec3;
 use multiversion::multiversion;
 use vertex_tree::Bounds;
 
-use super::{Flips, Frame};
+use super::{Flips, Frame, Watch};
 use crate::filter::{Lens, Lenses, Rates, earliest};
 use crate::front::Slot;
 use crate::motion::{Course, Motion, Odometer, Speed, Travel};
@@ -165,13 +165,16 @@ impl EventDriven {
     /// Schedules the nodes that have come to be watched in this frame.
     pub fn settle(&mut self, frame: &Frame) {
         let mut fresh = std::mem::take(&mut self.fresh);
-        fresh.retain(|event| self.queue.is_valid(event));
-        let mut left = &fresh[..];
-        let next = |_: &mut EventQueue, due: &mut [Event; LANES]| {
-            let (now, later) = left.split_at(left.len().min(LANES));
-            due[..now.len()].copy_from_slice(now);
-            left = later;
-            now.len()
+        let mut left = fresh.iter();
+        let next = |queue: &mut EventQueue, due: &mut [Event; LANES]| {
+            let mut count = 0;
+            while count < LANES
+                && let Some(event) = left.next()
+            {
+                due[count] = *event;
+                count += usize::from(queue.is_valid(event));
+            }
+            count
         };
         // A node that no view wants is active where another needs it: its time to fold is the next motion.
         self.process(frame, next, |event, queue| queue.schedule_ticks(0, *event));
@@ -212,20 +215,26 @@ impl EventDriven {
             self.queue.due_within(number, now, &mut f);
         }
     }
+}
 
-    pub fn watch(&mut self, slot: Slot, kind: Kind, bounds: Bounds) {
-        self.fresh.push(self.queue.event(slot, kind, bounds));
+impl Watch for EventDriven {
+    #[inline(always)]
+    fn watch(&mut self, _: &Frame, slot: Slot, kind: Kind, bounds: Bounds) {
+        let event = self.queue.event(slot, kind, bounds);
+        self.fresh.push(event);
     }
 
-    pub fn unwatch(&mut self, slot: Slot) {
+    #[inline(always)]
+    fn unwatch(&mut self, slot: Slot) {
         self.queue.cancel(slot);
     }
 
-    pub fn prefetch(&self, slot: Slot) {
+    #[inline(always)]
+    fn prefetch(&self, slot: Slot) {
         self.queue.prefetch(slot);
     }
 
-    pub fn refused(&mut self, slot: Slot, kind: Kind, bounds: Bounds) {
+    fn refused(&mut self, slot: Slot, kind: Kind, bounds: Bounds) {
         let event = self.queue.event(slot, kind, bounds);
         self.queue.press(event);
     }

@@ -6,7 +6,7 @@
 use multiversion::multiversion;
 use vertex_tree::Bounds;
 
-use super::{Flips, Frame};
+use super::{Flips, Frame, Watch};
 use crate::filter::{Lens, Lenses, certainly, doubtful, for_each_bit};
 use crate::front::Slot;
 use crate::packed::Packed;
@@ -29,7 +29,7 @@ impl FrontScan {
         scan(&self.unfolded, Kind::Fold, lenses.as_ref().map(Lenses::as_slice), frame, &mut flips.fold);
     }
 
-    pub fn watch(&mut self, slot: Slot, kind: Kind, bounds: Bounds) {
+    fn put(&mut self, slot: Slot, kind: Kind, bounds: Bounds) {
         if self.place.len() <= slot.index() {
             self.place.resize(slot.index() + 1, 0);
         }
@@ -41,14 +41,6 @@ impl FrontScan {
         }
     }
 
-    pub fn unwatch(&mut self, slot: Slot) {
-        let Some(place) = self.place.get_mut(slot.index()) else { return };
-        let Some(place) = std::mem::take(place).checked_sub(2) else { return };
-        if let Some(moved) = self.packed(place % 2 == 1).swap_remove(place as usize / 2) {
-            self.place[moved as usize] = place + 2;
-        }
-    }
-
     /// What is watched, boundary nodes and collapsible nodes; tags are slots.
     pub fn watched(&self) -> [(&Packed, Kind); 2] {
         [(&self.folded, Kind::Unfold), (&self.unfolded, Kind::Fold)]
@@ -56,6 +48,25 @@ impl FrontScan {
 
     fn packed(&mut self, unfolded: bool) -> &mut Packed {
         if unfolded { &mut self.unfolded } else { &mut self.folded }
+    }
+}
+
+impl Watch for FrontScan {
+    fn watch(&mut self, _: &Frame, slot: Slot, kind: Kind, bounds: Bounds) {
+        self.put(slot, kind, bounds);
+    }
+
+    fn unwatch(&mut self, slot: Slot) {
+        let Some(place) = self.place.get_mut(slot.index()) else { return };
+        let Some(place) = std::mem::take(place).checked_sub(2) else { return };
+        if let Some(moved) = self.packed(place % 2 == 1).swap_remove(place as usize / 2) {
+            self.place[moved as usize] = place + 2;
+        }
+    }
+
+    fn refused(&mut self, slot: Slot, kind: Kind, bounds: Bounds) {
+        // What is watched is tested in every frame anyway.
+        self.put(slot, kind, bounds);
     }
 }
 

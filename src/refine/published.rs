@@ -18,7 +18,7 @@
 use glam::DVec3;
 use vertex_tree::Bounds;
 
-use super::{Flips, Frame};
+use super::{Flips, Frame, Watch};
 use crate::front::{Front, Slot};
 use crate::queue::Kind;
 use crate::view::View;
@@ -71,21 +71,6 @@ impl Published {
         self.due = due;
     }
 
-    pub fn watch(&mut self, frame: &Frame, slot: Slot, kind: Kind, bounds: &Bounds) {
-        let ticket = *self.ticket(slot);
-        self.insert(frames_until(frame, kind, bounds), Entry { slot, kind, ticket });
-    }
-
-    pub fn refused(&mut self, slot: Slot, kind: Kind) {
-        let ticket = *self.ticket(slot);
-        self.insert(1.0, Entry { slot, kind, ticket });
-    }
-
-    pub fn unwatch(&mut self, slot: Slot) {
-        let ticket = self.ticket(slot);
-        *ticket = ticket.wrapping_add(1);
-    }
-
     fn ticket(&mut self, slot: Slot) -> &mut u32 {
         if self.tickets.len() <= slot.index() {
             self.tickets.resize(slot.index() + 1, 0);
@@ -97,6 +82,23 @@ impl Published {
         // At least 1, as in Figure 7; `as` saturates.
         let ahead = (frames as u64).clamp(1, HORIZON - 1);
         self.lists[((self.frame + ahead) % HORIZON) as usize].push(entry);
+    }
+}
+
+impl Watch for Published {
+    fn watch(&mut self, frame: &Frame, slot: Slot, kind: Kind, bounds: Bounds) {
+        let ticket = *self.ticket(slot);
+        self.insert(frames_until(frame, kind, &bounds), Entry { slot, kind, ticket });
+    }
+
+    fn unwatch(&mut self, slot: Slot) {
+        let ticket = self.ticket(slot);
+        *ticket = ticket.wrapping_add(1);
+    }
+
+    fn refused(&mut self, slot: Slot, kind: Kind, _: Bounds) {
+        let ticket = *self.ticket(slot);
+        self.insert(1.0, Entry { slot, kind, ticket });
     }
 }
 

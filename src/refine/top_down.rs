@@ -3,8 +3,9 @@
 //! The paper's recursion, with a stack. Records lie in the order in which the front descended, which is that of this
 //! walk where nothing has changed since: memory is read in sequence.
 
-use super::{Flips, Frame};
+use super::{Flips, Frame, Watch};
 use crate::front::{Front, Slot};
+use crate::queue::Kind;
 use vertex_tree::{Bounds, NONE};
 
 #[derive(Default)]
@@ -47,4 +48,15 @@ impl TopDown {
             }
         }
     }
+}
+
+/// It looks at everything anyway.
+impl Watch for TopDown {
+    #[inline(always)]
+    fn watch(&mut self, _: &Frame, _: Slot, _: Kind, _: Bounds) {}
+
+    #[inline(always)]
+    fn unwatch(&mut self, _: Slot) {}
+
+    fn refused(&mut self, _: Slot, _: Kind, _: Bounds) {}
 }
