@@ -9,7 +9,7 @@ use std::path::PathBuf;
 use std::sync::Arc;
 use std::time::{Duration, Instant};
 
-use detail_block::{Arrangement, BuildOptions, Loading, XfmFile, XfmTree};
+use detail_block::{Arrangement, BuildOptions, Io, XfmFile, XfmTree};
 use foldfront::active_mesh::ActiveMesh;
 use foldfront::budget::Budget;
 use foldfront::deviation::Reference;
@@ -87,7 +87,7 @@ fn engine<M: MeshSink>(
     soft: f64,
 ) -> Engine<XfmTree, M> {
     let paging = detail_block::Settings {
-        loading: Loading::Blocking,
+        io: Io::Blocking,
         soft_quota: (soft * file.resident_bytes_of_all() as f64) as u64,
         ..detail_block::Settings::default()
     };

@@ -260,7 +260,8 @@ macro_rules! with_trees {
             Store::MtPartition(file) => {
                 let $open = || {
                     let memory = Memory::new(paging.page_memory);
-                    let settings = mt_partition::Settings { cache: paging.cache, memory, reader: None };
+                    let settings =
+                        mt_partition::Settings { cache: paging.cache, memory, ..Default::default() };
                     let tree = MtTree::new(file.clone(), settings);
                     tree.map(Settled::new).map_err(|e| subject.store_error(e.into()))
                 };

@@ -117,6 +117,7 @@ fn a_hundred_objects_share_a_budget() {
             cache: CacheMode::PCc,
             memory: memory.clone(),
             reader: Some(reader.clone()),
+            ..Default::default()
         };
         parts.push((MtTree::new(files[i % 3].clone(), settings).unwrap(), NullSink, placement));
     }

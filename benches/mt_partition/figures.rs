@@ -45,7 +45,7 @@ pub fn figures(model: &str, log: &CollapseLog) {
                     let limited = mt_partition::Settings {
                         cache: CacheMode::PCc,
                         memory: Memory::new(limit),
-                        reader: None,
+                        ..Default::default()
                     };
                     let tree = MtTree::new(file.clone(), limited).expect("enough memory");
                     let engine = Engine::new(tree, NullSink, settings(&path, Strategy::Event));

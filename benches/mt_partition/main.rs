@@ -27,7 +27,7 @@ use foldfront::view::{Camera, View, theta_of_pixels};
 use foldfront::{CollapseLog, Mesh, mesh_io, simplify};
 use glam::DVec3;
 use in_memory::{Hierarchy, InMemoryTree};
-use mt_partition::{BuildOptions, CacheMode, Memory, MtFile, MtTree, WriteReport};
+use mt_partition::{BuildOptions, CacheMode, MtFile, MtTree, WriteReport};
 
 fn main() {
     let words: Vec<String> = std::env::args().skip(1).filter(|a| !a.starts_with("--")).collect();
@@ -120,7 +120,7 @@ fn views(path: &Path) -> Vec<View> {
 }
 
 fn tree(file: &Arc<MtFile>, cache: CacheMode) -> MtTree {
-    let settings = mt_partition::Settings { cache, memory: Memory::default(), reader: None };
+    let settings = mt_partition::Settings { cache, ..Default::default() };
     MtTree::new(file.clone(), settings).expect("no limit of memory")
 }
 

@@ -29,6 +29,11 @@ impl FrontScan {
         scan(&self.unfolded, Kind::Fold, lenses.as_ref().map(Lenses::as_slice), frame, &mut flips.fold);
     }
 
+    /// What is watched, boundary nodes and collapsible nodes; tags are slots.
+    pub fn watched(&self) -> [(&Packed, Kind); 2] {
+        [(&self.folded, Kind::Unfold), (&self.unfolded, Kind::Fold)]
+    }
+
     fn put(&mut self, slot: Slot, kind: Kind, bounds: Bounds) {
         if self.place.len() <= slot.index() {
             self.place.resize(slot.index() + 1, 0);

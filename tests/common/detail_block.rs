@@ -7,7 +7,7 @@ use std::cell::RefCell;
 use std::rc::Rc;
 use std::sync::Arc;
 
-use detail_block::{Arrangement, BuildOptions, Loading, XfmFile, XfmTree};
+use detail_block::{Arrangement, BuildOptions, Io, XfmFile, XfmTree};
 use foldfront::CollapseLog;
 use foldfront::budget::Budget;
 use foldfront::engine::{Engine, FrameReport, Settings};
@@ -24,9 +24,9 @@ pub fn options(quantize: bool, nest_needs: bool) -> BuildOptions {
     BuildOptions { quantize, nest_needs, ..BuildOptions::default() }
 }
 
-/// Settings of a tree that loads in this way, without quotas.
-pub fn loading(loading: Loading) -> detail_block::Settings {
-    detail_block::Settings { loading, ..detail_block::Settings::default() }
+/// Settings of a tree that reads in this way, without quotas.
+pub fn reading(io: Io) -> detail_block::Settings {
+    detail_block::Settings { io, ..detail_block::Settings::default() }
 }
 
 /// The file that an arrangement makes.
@@ -103,7 +103,7 @@ pub fn follow(log: &CollapseLog, settings: &[Settings], quantize: bool) -> Vec<B
     let arrangement = Arrangement::new(log, &options(quantize, true)).unwrap();
     let file = file(&arrangement);
     let cut = Rc::new(RefCell::new(OwnCut::new(&arrangement.effective_log())));
-    let how = loading(if quantize { Loading::Background } else { Loading::Blocking });
+    let how = reading(if quantize { Io::Background } else { Io::Blocking });
     let own = |&settings: &Settings| Own {
         engine: Engine::new(XfmTree::new(file.clone(), how).unwrap(), NullSink, settings).unwrap(),
         cut: cut.clone(),

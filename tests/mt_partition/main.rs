@@ -1,5 +1,6 @@
 //! The partitioned multi-triangulation: what is displayed, how it pages, and what it does with bad stores and bad files.
 
+mod ahead;
 #[path = "../common/mod.rs"]
 mod common;
 mod damage;

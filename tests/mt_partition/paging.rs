@@ -280,6 +280,7 @@ fn trees_share_a_budget() {
                 cache: CacheMode::PCc,
                 memory: memory.clone(),
                 reader: Some(reader.clone()),
+                ..Default::default()
             };
             let tree = MtTree::new(file.clone(), settings).unwrap();
             (Engine::new(tree, NullSink, Settings::default()).unwrap(), Walk::new(seed, 300.0))

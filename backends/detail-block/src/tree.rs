@@ -11,8 +11,9 @@
 //! For a sink that does not keep the mesh none is kept here either: what is displayed follows from the nodes.
 
 use std::sync::Arc;
+use std::time::Duration;
 
-use vertex_tree::{Bounds, MeshSink, NONE, NodeId, PageStats, Step, TreeError, VertexTree};
+use vertex_tree::{Bounds, MeshSink, NONE, NodeId, PageStats, Prefetch, Step, TreeError, VertexTree};
 
 use crate::block::ACTIVE;
 use crate::error::XfmError;
@@ -20,8 +21,9 @@ use crate::file::XfmFile;
 use crate::half_edges::{Adjacent, BOUNDARY, HalfEdge};
 use crate::loader::Loader;
 use crate::numbering::{Owner, owner};
-use crate::paging::{Paging, PagingCounts, tree_error};
-use crate::settings::{Loading, Settings};
+use crate::paging::{Paging, PagingCounts};
+use crate::requests::tree_error;
+use crate::settings::{Io, Settings};
 use crate::shown::Shown;
 
 /// A front through an XFM file.
@@ -30,13 +32,8 @@ pub struct XfmTree {
     roots: Vec<NodeId>,
     pub(crate) shown: Option<Shown>,
     pub(crate) displayed: u64,
-    loads_ahead: bool,
-    /// Nodes near which blocks are loaded ahead of time at the end of the frame, and in how many ticks they may be due.
-    ahead: Vec<(u32, NodeId)>,
+    foresees: bool,
 }
-
-/// Nodes that are looked at for loading ahead in one frame.
-const MOST_AHEAD: usize = 1024;
 
 impl XfmTree {
     /// A tree with every node folded.
@@ -44,11 +41,11 @@ impl XfmTree {
     /// # Errors
     /// If the I/O thread can not be started.
     pub fn new(file: Arc<XfmFile>, settings: Settings) -> Result<Self, XfmError> {
-        let name = file.name().to_owned();
-        let loader = match settings.loading {
-            Loading::Blocking => None,
-            _ => Some(Loader::start(file.clone()).map_err(|source| XfmError::Read {
-                file: name,
+        let loader = match settings.io {
+            Io::Blocking => None,
+            Io::Simulated(store) => Some(Loader::simulated(file.clone(), store)),
+            Io::Background => Some(Loader::thread(file.clone()).map_err(|source| XfmError::Read {
+                file: file.name().to_owned(),
                 offset: 0,
                 length: 0,
                 source,
@@ -56,8 +53,8 @@ impl XfmTree {
         };
         let roots = file.roots().iter().map(|&(root, _)| root).collect();
         let paging = Paging::new(file, loader, &settings);
-        let loads_ahead = settings.loading == Loading::Background;
-        Ok(Self { paging, roots, shown: None, displayed: 0, loads_ahead, ahead: Vec::new() })
+        let foresees = settings.prefetch == Prefetch::Schedule && settings.io != Io::Blocking;
+        Ok(Self { paging, roots, shown: None, displayed: 0, foresees })
     }
 
     /// The file.
@@ -268,9 +265,6 @@ impl VertexTree for XfmTree {
             block.active += 1;
         }
         self.displayed += brought(adjacent);
-        if self.loads_ahead && self.ahead.len() < MOST_AHEAD {
-            self.ahead.push((0, node));
-        }
         Ok(Step::Done)
     }
 
@@ -306,10 +300,23 @@ impl VertexTree for XfmTree {
         Ok(Step::Done)
     }
 
-    fn will_need(&mut self, node: NodeId, ticks: u32) {
-        if self.loads_ahead && self.ahead.len() < MOST_AHEAD {
-            self.ahead.push((ticks, node));
+    fn look_ahead(&self) -> u32 {
+        if self.foresees { self.paging.foresight.frames() } else { 0 }
+    }
+
+    fn will_need(&mut self, node: NodeId, frames: u32) {
+        if self.foresees {
+            self.paging.foresee(node, frames);
         }
+    }
+
+    fn peek(&self, node: NodeId, children: &mut Vec<(NodeId, Bounds)>) -> bool {
+        self.paging.peek(node, children)
+    }
+
+    fn pass(&mut self, time: Duration) -> Result<(), TreeError> {
+        self.paging.pass(time);
+        Ok(())
     }
 
     fn begin_frame(&mut self, arrived: &mut Vec<NodeId>) -> Result<(), TreeError> {
@@ -322,24 +329,9 @@ impl VertexTree for XfmTree {
     }
 
     fn end_frame(&mut self) -> Result<PageStats, TreeError> {
-        let levels = self.paging.file.levels();
-        let mut ahead = std::mem::take(&mut self.ahead);
-        ahead.sort_unstable();
-        for (_, node) in ahead.drain(..) {
-            // The node's own block, if it has been removed; what unfolding it takes; and what its children would take.
-            let number = levels.block(node);
-            self.paging.ask_ahead(number..number + 1);
-            self.paging.ask_ahead(self.paging.child_blocks(node).unwrap_or_default());
-            let children: [Option<NodeId>; 2] = {
-                let mut children = self.children(node);
-                [children.next(), children.next()]
-            };
-            for child in children.into_iter().flatten() {
-                let below = self.paging.child_blocks(child).unwrap_or_default();
-                self.paging.ask_ahead(below);
-            }
+        if self.foresees {
+            self.paging.ask_for_foreseen();
         }
-        self.ahead = ahead;
         Ok(self.paging.end_frame())
     }
 }

@@ -46,7 +46,7 @@ pub struct WriteReport {
 
 /// Writes the hierarchy of a log: whole, or not at all.
 ///
-/// Takes time in proportion to the log, and beside the log about 40 bytes a node and 16 a triangle of memory; the file
+/// Takes time in proportion to the log, and beside the log about 41 bytes a node and 16 a triangle of memory; the file
 /// itself is written page by page.
 ///
 /// # Errors
@@ -156,7 +156,7 @@ impl Writer<'_> {
         let slot = |n: u32| blocking.number[n as usize].0 & ((1 << blocking.slot_bits) - 1);
         let mut nodes = Vec::new();
         for &top in tops {
-            blocking::walk(arrangement, top, blocking.levels, |n| nodes.push(n), |_| ());
+            blocking.walk(arrangement, top, |n| nodes.push(n));
         }
         words.extend([0; page::HEADER_WORDS]);
         let (mut links, mut triangles) = (Vec::new(), 0);
@@ -170,7 +170,7 @@ impl Writer<'_> {
             words.extend([span.first, span.pivot, n]);
             let [kept, removed] = arrangement.children(n).map(|child| match child {
                 NONE => Child::Leaf.encode(),
-                // Blocks that share a page hang below another page: a child here is in the same block.
+                // Blocks that share a page hang below another page: a child here is in the same block, or in one joined to it.
                 child if is_here(child) => Child::Slot(slot(child)).encode(),
                 child => {
                     links.push(child);

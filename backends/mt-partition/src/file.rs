@@ -9,7 +9,7 @@ use crate::MtError;
 use crate::format::{CHECKSUM, HEADER, Header, MAGIC, NODE, PARTITION, ROOT, VERSION};
 use crate::record::{Limits, Record};
 
-/// A file, opened. Its tables stay in memory, about 12 bytes a node, and with them the base mesh; shared between trees.
+/// A file, opened. Its tables stay in memory, about 16 bytes a node, and with them the base mesh; shared between trees.
 pub struct MtFile {
     source: Arc<dyn PageSource>,
     pub(crate) header: Header,
@@ -17,6 +17,8 @@ pub struct MtFile {
     root_bounds: Vec<Bounds>,
     /// First node of each partition, and one entry more: the number of nodes.
     pub(crate) partitions: Vec<u32>,
+    /// The partition of each node.
+    partition_of: Vec<u32>,
     /// Where each node's record starts, and one entry more: where the last one ends.
     offsets: Vec<u64>,
     pub(crate) log_numbers: Vec<u32>,
@@ -89,6 +91,11 @@ impl MtFile {
         {
             return Err(range(start, "first node of a partition", pair[0]));
         }
+        // The first is 0, the last the number of nodes, so this adds up.
+        let partition_of = (0..)
+            .zip(partitions.windows(2))
+            .flat_map(|(p, pair)| std::iter::repeat_n(p, (pair[1] - pair[0]) as usize))
+            .collect();
         let start = at;
         let table = opener.table("nodes", &mut at, header.nodes * NODE)?;
         let mut offsets = Vec::with_capacity(nodes + 1);
@@ -122,7 +129,7 @@ impl MtFile {
         if base.number() != NONE || base.above().next().is_some() {
             return Err(range(at, "number of the source", base.number()));
         }
-        Ok(Self { source, header, roots, root_bounds, partitions, offsets, log_numbers, base })
+        Ok(Self { source, header, roots, root_bounds, partitions, partition_of, offsets, log_numbers, base })
     }
 
     /// What errors call the file.
@@ -208,8 +215,14 @@ impl MtFile {
     }
 
     /// The partition that a node is in.
+    #[inline]
     pub(crate) fn partition_of(&self, node: u32) -> u32 {
-        self.partitions.partition_point(|&first| first <= node) as u32 - 1
+        self.partition_of[node as usize]
+    }
+
+    /// Bytes of nodes with consecutive numbers as stored.
+    pub(crate) fn bytes(&self, nodes: std::ops::Range<u32>) -> u64 {
+        self.offsets[nodes.end as usize] - self.offsets[nodes.start as usize]
     }
 
     /// Reads the records of nodes with consecutive numbers, in one go. A record that is damaged is told apart from the

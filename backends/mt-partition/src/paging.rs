@@ -6,18 +6,29 @@
 //! the other, however little memory there is: nothing else has to stay, as the displayed patches do not depend on the
 //! records that they came from, and the engine keeps the bounds of the nodes in play.
 //!
+//! Groups come first. What is foreseen (`foresight`) is fetched behind them and has to make do with the room that they
+//! leave (`room`).
+//!
 //! All of this runs on the thread of the tree; see [`reader`](crate::reader) for the one that reads.
+
+mod answers;
+mod foresight;
+mod room;
 
 use std::ops::Range;
 use std::sync::Arc;
+use std::time::Duration;
 
 use rustc_hash::{FxHashMap, FxHashSet};
-use vertex_tree::{NONE, NodeId, PageStats};
+use vertex_tree::{NONE, NodeId, PageStats, Prefetch};
 
+use self::foresight::Foresight;
+use self::room::Need;
 use crate::cache::{CacheMode, PartitionState, Passed};
 use crate::file::MtFile;
 use crate::memory::Memory;
-use crate::reader::{Answer, Line, Reader};
+use crate::reader::{Answer, Line, NOW, Reader, Ticket};
+use crate::record::Record;
 use crate::residents::{OVERHEAD, Residents};
 
 /// Which neighbours a change needs.
@@ -25,6 +36,16 @@ use crate::residents::{OVERHEAD, Residents};
 pub(crate) enum Change {
     Unfold,
     Fold,
+}
+
+impl Change {
+    /// The nodes that the change of a node needs beyond the node itself.
+    fn neighbours(self, record: &Record, mut f: impl FnMut(u32)) {
+        match self {
+            Self::Unfold => record.below().for_each(f),
+            Self::Fold => record.above().filter(|&(n, _)| n != NONE).for_each(|(n, _)| f(n)),
+        }
+    }
 }
 
 /// A group that has been asked for.
@@ -35,11 +56,17 @@ struct Group {
     reads: u32,
 }
 
+/// A read that has been asked for.
+#[derive(Debug)]
+struct Read {
+    ticket: Ticket,
+    /// The nodes whose groups wait for it; none if it is only foreseen.
+    waiting: Vec<u32>,
+}
+
 /// Frames in which the cache mode may wait for answers: what has arrived for a change that waits for more would be let go
 /// of otherwise. A front that never comes to rest must not keep everything.
 const PATIENCE: u32 = 16;
-/// A read that has failed is tried again after 1, 2, 4 ... frames, up to this many.
-const LONGEST_PAUSE: u64 = 64;
 
 #[derive(Debug)]
 pub(crate) struct Paging {
@@ -54,12 +81,16 @@ pub(crate) struct Paging {
     frame: u64,
     /// By the node that is to change.
     groups: FxHashMap<u32, Group>,
-    /// By what is read, a partition or a node: the nodes that wait for it.
-    reads: FxHashMap<u32, Vec<u32>>,
+    /// By what is read, a partition or a node.
+    reads: FxHashMap<u32, Read>,
     /// Nodes on their way for which there is room.
     reserved: FxHashSet<u32>,
     /// Changes of this frame for which there was no room.
     deferred: Vec<(u32, Change)>,
+    /// A change for which there was none although everything gave way, and whether it has been asked for in this frame.
+    /// Until it is made, others may not take the room that it waits for: each could lose its first records to the others
+    /// while it waits for the next.
+    first: Option<(u32, bool)>,
     /// Changes that can be asked for again in the next frame.
     again: Vec<u32>,
     /// What was read badly: how often in a row, and the frame from which on it may be tried again.
@@ -74,12 +105,20 @@ pub(crate) struct Paging {
     has_told: bool,
     /// Frames in a row in which room was wanted that could not be had by letting go of what no cut holds.
     pressed: u32,
+    /// What the engine foresees, where that is asked for.
+    foresight: Option<Foresight>,
     stats: PageStats,
     pub is_lost: bool,
 }
 
 impl Paging {
-    pub fn new(file: Arc<MtFile>, mode: CacheMode, memory: Memory, reader: Reader) -> Self {
+    pub fn new(
+        file: Arc<MtFile>,
+        mode: CacheMode,
+        prefetch: Prefetch,
+        memory: Memory,
+        reader: Reader,
+    ) -> Self {
         let member = memory.join();
         let mut paging = Self {
             member,
@@ -96,12 +135,14 @@ impl Paging {
             reads: FxHashMap::default(),
             reserved: FxHashSet::default(),
             deferred: Vec::new(),
+            first: None,
             again: Vec::new(),
             failures: FxHashMap::default(),
             dirty: Vec::new(),
             answers: Vec::new(),
             unanswered_frames: 0,
             pressed: 0,
+            foresight: (prefetch == Prefetch::Schedule).then(Foresight::default),
             stats: PageStats::default(),
             is_lost: false,
             file,
@@ -164,6 +205,10 @@ impl Paging {
         self.mark(partition);
     }
 
+    pub fn is_active(&self, node: u32) -> bool {
+        self.active[node as usize]
+    }
+
     /// A node in memory has been unfolded, and so have `above` before, or folded: arcs come into the cut and leave it.
     pub fn changed(&mut self, node: u32, change: Change, above: &[u32], below: &[u32], arcs: u32) {
         self.active[node as usize] = change == Change::Unfold;
@@ -181,6 +226,7 @@ impl Paging {
         // A root without triangles is shown by nothing; it is in play all the same.
         self.set_links(node, arcs.max(1));
         self.note(node, change);
+        self.count_use(node, gain);
     }
 
     // Requests.
@@ -188,154 +234,89 @@ impl Paging {
     /// Whether all that a change of a node needs is in memory. If not, it has been asked for.
     pub fn has(&mut self, node: u32, change: Change) -> bool {
         if let Some(record) = self.residents.get(node) {
-            let all = match change {
-                Change::Unfold => record.below().all(|n| self.residents.contains(n)),
-                Change::Fold => record.above().all(|(n, _)| n == NONE || self.residents.contains(n)),
-            };
+            let mut all = true;
+            change.neighbours(record, |n| all &= self.residents.contains(n));
             if all {
+                self.first = self.first.filter(|&(first, _)| first != node);
                 return true;
             }
         }
-        if !self.groups.contains_key(&node) && !self.request(node, change, false) {
+        if let Some((_, is_asked_for)) = self.first.as_mut().filter(|(first, _)| *first == node) {
+            *is_asked_for = true;
+        }
+        if !self.groups.contains_key(&node) && !self.request(node, change, Need::Change) {
             self.deferred.push((node, change));
         }
         false
     }
 
     /// Asks for what a change needs, if there is room for it.
-    fn request(&mut self, node: u32, change: Change, spare_nothing: bool) -> bool {
+    fn request(&mut self, node: u32, change: Change, need: Need) -> bool {
+        if self.first.is_some_and(|(first, _)| first != node && !self.groups.contains_key(&first)) {
+            return false;
+        }
         let mut members = vec![node];
         if let Some(record) = self.residents.get(node) {
-            match change {
-                Change::Unfold => members.extend(record.below()),
-                Change::Fold => members.extend(record.above().map(|(n, _)| n).filter(|&n| n != NONE)),
-            }
+            change.neighbours(record, |n| members.push(n));
         }
         let missing: Vec<u32> = members.iter().copied().filter(|&n| !self.residents.contains(n)).collect();
         let mut units: Vec<u32> = missing.iter().map(|&n| self.unit_of(n)).collect();
         units.sort_unstable();
         units.dedup();
-        if units.iter().any(|unit| self.failures.get(unit).is_some_and(|&(_, from)| from > self.frame)) {
+        if units.iter().any(|&unit| self.is_paused(unit)) {
             self.again.push(node);
             return true;
         }
-        let unreserved = || missing.iter().filter(|n| !self.reserved.contains(n));
-        let bytes = unreserved().map(|&n| self.bytes_of(n)).sum();
         for &n in &members {
             self.residents.pin(n);
         }
-        if !self.reserve(bytes, spare_nothing) {
+        if let Err(bytes) = self.reserve(&missing, need) {
             for &n in &members {
                 self.residents.unpin(n, 0);
             }
             self.wanted = self.wanted.max(bytes);
             return false;
         }
-        self.reserved.extend(missing);
+        let mut reads = 0;
         for &unit in &units {
-            if !self.reads.contains_key(&unit) {
-                let nodes = self.nodes_of(unit);
-                self.is_lost |= !self.line.ask(nodes);
-            }
-            self.reads.entry(unit).or_default().push(node);
+            reads += u32::from(self.ask(unit, NOW, Some(node)));
         }
-        self.groups.insert(node, Group { members, reads: units.len() as u32 });
+        self.groups.insert(node, Group { members, reads });
         true
     }
 
-    /// Reserves room, and makes some if there is none: of what no cut holds, or of anything.
-    fn reserve(&mut self, bytes: u64, spare_nothing: bool) -> bool {
-        loop {
-            if self.residents.memory().try_reserve(bytes) {
-                return true;
+    /// Asks for a partition or a node, or makes a request that is there more urgent. Says whether there will be an answer.
+    fn ask(&mut self, unit: u32, urgency: u64, waiting: Option<u32>) -> bool {
+        if let Some(read) = self.reads.get_mut(&unit) {
+            // What a change waits for stays the most urgent.
+            if read.waiting.is_empty() {
+                self.line.rank(&mut read.ticket, urgency);
             }
-            if !self.let_go_of_one(spare_nothing) {
-                return false;
+            read.waiting.extend(waiting);
+            return true;
+        }
+        match self.line.ask(self.nodes_of(unit), urgency) {
+            Some(ticket) => {
+                self.reads.insert(unit, Read { ticket, waiting: waiting.into_iter().collect() });
+                true
+            }
+            None => {
+                self.is_lost = true;
+                false
             }
         }
     }
 
-    fn let_go_of_one(&mut self, spare_nothing: bool) -> bool {
-        let links = &self.links;
-        let oldest = self.residents.oldest(self.frame, |n| links[n as usize] > 0);
-        let node = oldest.or_else(|| self.residents.any(self.frame).filter(|_| spare_nothing));
-        if let Some(node) = node {
-            self.let_go(node);
-        }
-        node.is_some()
+    /// Whether something was read badly, and not long ago.
+    fn is_paused(&self, unit: u32) -> bool {
+        self.failures.get(&unit).is_some_and(|&(_, from)| from > self.frame)
     }
 
-    fn let_go(&mut self, node: u32) {
-        self.residents.remove(node, self.bytes_of(node));
-        let partition = self.file.partition_of(node) as usize;
-        let state = &mut self.partitions[partition];
-        state.resident -= 1;
-        if state.resident == 0 {
-            state.forget();
-        }
-    }
-
-    // Answers.
-
-    fn arrive(&mut self, answer: Answer, arrived: &mut Vec<NodeId>) {
-        let unit = self.unit_of(answer.nodes.start);
-        let waiting = self.reads.remove(&unit).unwrap_or_default();
-        let mut faults = 0;
-        match answer.records {
-            Err(_) => faults = 1,
-            Ok(records) => {
-                self.stats.reads += 1;
-                self.stats.read_bytes += answer.nodes.clone().map(|n| self.file.length(n)).sum::<u64>();
-                for (node, record) in answer.nodes.clone().zip(records) {
-                    let Ok(record) = record else {
-                        faults += 1;
-                        continue;
-                    };
-                    let bytes = self.bytes_of(node);
-                    let is_new = !self.residents.contains(node);
-                    if self.reserved.remove(&node) || is_new && self.residents.memory().try_reserve(bytes) {
-                        self.residents.insert(node, record, bytes);
-                        let partition = self.file.partition_of(node);
-                        self.partitions[partition as usize].resident += 1;
-                        self.mark(partition);
-                        for waiting in &waiting {
-                            if self.groups.get(waiting).is_some_and(|group| group.members.contains(&node)) {
-                                self.residents.pin(node);
-                            }
-                        }
-                    }
-                }
-            }
-        }
-        // What did not come needs no room.
-        for node in answer.nodes {
-            if self.reserved.remove(&node) {
-                self.residents.memory().release(self.bytes_of(node));
-            }
-        }
-        if faults == 0 {
-            self.failures.remove(&unit);
-        } else {
-            self.stats.faults += faults;
-            let (times, from) = self.failures.entry(unit).or_default();
-            *from = self.frame + (1_u64 << *times).min(LONGEST_PAUSE);
-            *times = (*times + 1).min(LONGEST_PAUSE.ilog2());
-        }
-        for node in waiting {
-            let Some(group) = self.groups.get_mut(&node) else { continue };
-            group.reads -= 1;
-            if group.reads == 0 {
-                let members = self.groups.remove(&node).map(|group| group.members).unwrap_or_default();
-                for n in members {
-                    self.residents.unpin(n, self.frame);
-                }
-                arrived.push(NodeId(node));
-            }
-        }
-    }
+    // Frames.
 
     pub fn begin_frame(&mut self, arrived: &mut Vec<NodeId>) {
         self.frame += 1;
+        self.line.set_frame(self.frame);
         arrived.extend(self.again.drain(..).map(NodeId));
         for answer in std::mem::take(&mut self.answers) {
             self.arrive(answer, arrived);
@@ -347,19 +328,32 @@ impl Paging {
 
     /// Waits for all that has been asked for.
     pub fn settle(&mut self) {
-        while let Some(answer) = self.line.wait() {
-            self.answers.push(answer);
-        }
+        let answers = &mut self.answers;
+        self.line.settle(|answer| answers.push(answer));
+    }
+
+    /// Lets time pass, where it is virtual.
+    pub fn pass(&mut self, time: Duration) {
+        self.line.pass(time);
     }
 
     pub fn end_frame(&mut self) -> PageStats {
+        self.foresee();
         // What found no room may have anything that is not needed at this moment.
         self.wanted = 0;
-        for (node, change) in std::mem::take(&mut self.deferred) {
-            if !self.groups.contains_key(&node) && !self.request(node, change, true) {
+        self.first = self.first.and_then(|(first, is_asked_for)| is_asked_for.then_some((first, false)));
+        let mut deferred = std::mem::take(&mut self.deferred);
+        let is_first = |node: u32| self.first.is_some_and(|(first, _)| first == node);
+        deferred.sort_by_key(|&(node, _)| !is_first(node));
+        for (node, change) in deferred.drain(..) {
+            if !self.groups.contains_key(&node) && !self.request(node, change, Need::Pressing) {
+                self.first = self.first.or(Some((node, true)));
                 self.again.push(node);
+                self.stats.no_room += 1;
             }
         }
+        self.deferred = deferred;
+        self.fetch_ahead();
         if self.wanted > 0 || self.has_told {
             self.residents.memory().want(self.member, self.wanted);
             self.has_told = self.wanted > 0;
@@ -375,20 +369,6 @@ impl Paging {
         stats
     }
 
-    /// Makes room where the limit has been lowered, or where another tree could not have what it wants.
-    fn relieve(&mut self) {
-        let mut excess = self.residents.memory().excess(self.member);
-        self.pressed = if excess > 0 { self.pressed + 1 } else { 0 };
-        while excess > 0 {
-            let memory = self.residents.memory();
-            let spare_nothing = self.pressed > 1 || memory.used() > memory.limit();
-            if !self.let_go_of_one(spare_nothing) {
-                break;
-            }
-            excess = self.residents.memory().excess(self.member);
-        }
-    }
-
     /// Lets go of what the cache mode does not keep, in the partitions where anything has changed.
     fn clean(&mut self) {
         let mut dirty = std::mem::take(&mut self.dirty);
@@ -398,17 +378,18 @@ impl Paging {
             let nodes =
                 self.file.partitions[partition as usize]..self.file.partitions[partition as usize + 1];
             let state = self.partitions[partition as usize];
-            let layer = |&n: &u32| self.residents.get(n).map(crate::record::Record::layer);
+            let layer = |&n: &u32| self.residents.get(n).map(Record::layer);
             let in_cut = nodes.clone().filter(|&n| self.links[n as usize] > 0);
             let layers = in_cut.filter_map(|n| layer(&n));
             let cut = [layers.clone().min().unwrap_or(0), layers.max().unwrap_or(0)];
             let mut is_postponed = false;
             for node in nodes {
-                let Some(layer) = self.residents.get(node).map(crate::record::Record::layer) else {
+                let Some(layer) = self.residents.get(node).map(Record::layer) else {
                     continue;
                 };
                 let passed = Passed { layer, is_active: self.active[node as usize] };
-                if self.links[node as usize] > 0 || state.keeps(self.mode, cut, passed) {
+                let is_kept = self.links[node as usize] > 0 || state.keeps(self.mode, cut, passed);
+                if is_kept || self.foresight.as_ref().is_some_and(|f| f.keeps(node)) {
                     continue;
                 }
                 if self.residents.is_free(node, self.frame) {

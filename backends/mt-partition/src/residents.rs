@@ -102,11 +102,11 @@ impl Residents {
         }
     }
 
-    /// A request that relied on the node has been answered: it stays for another frame.
+    /// A request that relied on the node has been answered, so that it stays for this frame, or given up (`frame` 0).
     pub fn unpin(&mut self, node: u32, frame: u64) {
         if let Some(resident) = self.get_mut(node) {
             resident.pins = resident.pins.saturating_sub(1);
-            resident.stays = frame;
+            resident.stays = resident.stays.max(frame);
         }
     }
 
@@ -144,7 +144,7 @@ impl Residents {
                 // Its turn comes again.
                 later.push((node, stamp));
             }
-            // What is held back is in the cut, and comes to the end of the queue when it leaves it.
+            // What is held back comes to the end of the queue when it is not any more.
             self.queue.pop_front();
         }
         for entry in later.into_iter().rev() {
@@ -153,12 +153,12 @@ impl Residents {
         found
     }
 
-    /// Any node that may go, each once in a while.
-    pub fn any(&mut self, frame: u64) -> Option<u32> {
+    /// Any node that may go and that `held_back` does not hold back, each once in a while.
+    pub fn any(&mut self, frame: u64, held_back: impl Fn(u32) -> bool) -> Option<u32> {
         for _ in 0..self.all.len() {
             self.hand = if self.hand + 1 < self.all.len() { self.hand + 1 } else { 0 };
             let node = self.all[self.hand].node;
-            if self.is_free(node, frame) {
+            if self.is_free(node, frame) && !held_back(node) {
                 return Some(node);
             }
         }

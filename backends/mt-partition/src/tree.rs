@@ -2,7 +2,9 @@
 
 use std::sync::Arc;
 
-use vertex_tree::{Bounds, MeshSink, NONE, NodeId, PageStats, Step, TreeError, VertexId, VertexTree};
+use vertex_tree::{
+    Bounds, MeshSink, NONE, NodeId, PageStats, Prefetch, Step, TreeError, VertexId, VertexTree,
+};
 
 use crate::MtError;
 use crate::cache::CacheMode;
@@ -19,8 +21,12 @@ pub struct Settings {
     pub cache: CacheMode,
     /// The budget, which other trees may hold clones of.
     pub memory: Memory,
-    /// The thread that reads, which other trees may use too; without, the tree gets one of its own.
+    /// The thread that reads, or a store on virtual time, which other trees may use too; without, the tree gets a thread
+    /// of its own.
     pub reader: Option<Reader>,
+    /// What fetches nodes before a change needs them. The paper's scheme is to load on first demand, in the units of the
+    /// cache mode, so [`Prefetch::Paper`] and [`Prefetch::None`] are one.
+    pub prefetch: Prefetch,
 }
 
 /// A file and the state of one front through it.
@@ -45,7 +51,7 @@ impl MtTree {
     /// # Errors
     /// [`MtError::Memory`] if the budget is below [`MtFile::least_memory`], [`MtError::Io`] if a thread can not be had.
     pub fn new(file: Arc<MtFile>, settings: Settings) -> Result<Self, MtError> {
-        let Settings { cache, memory, reader } = settings;
+        let Settings { cache, memory, reader, prefetch } = settings;
         let (allowed, needed) = (memory.limit(), file.least_memory());
         if allowed < needed {
             return Err(MtError::Memory { allowed, needed });
@@ -53,7 +59,7 @@ impl MtTree {
         let thread = |source| MtError::Io { file: file.name().to_owned(), offset: 0, length: 0, source };
         let reader = reader.map_or_else(|| Reader::new().map_err(thread), Ok)?;
         Ok(Self {
-            paging: Paging::new(file.clone(), cache, memory.clone(), reader),
+            paging: Paging::new(file.clone(), cache, prefetch, memory.clone(), reader),
             memory,
             display: None,
             displayed: u64::from(file.base.fine()),
@@ -206,6 +212,34 @@ impl VertexTree for MtTree {
             }
         }
         Ok(Step::Done)
+    }
+
+    fn look_ahead(&self) -> u32 {
+        self.paging.look_ahead()
+    }
+
+    fn will_need(&mut self, node: NodeId, frames: u32) {
+        self.paging.will_need(node.0, frames);
+    }
+
+    /// A child is shown below the first of its parents that is folded: once, however many parents it has. Of the
+    /// children, those that are in memory are shown.
+    fn peek(&self, node: NodeId, children: &mut Vec<(NodeId, Bounds)>) -> bool {
+        let Some(record) = self.paging.residents.get(node.0) else { return false };
+        for below in record.below() {
+            let Some(child) = self.paging.residents.get(below) else { continue };
+            let mut folded =
+                child.above().map(|(n, _)| n).filter(|&n| n != NONE && !self.paging.is_active(n));
+            if folded.next() == Some(node.0) {
+                children.push((NodeId(below), child.bounds()));
+            }
+        }
+        true
+    }
+
+    fn pass(&mut self, time: std::time::Duration) -> Result<(), TreeError> {
+        self.paging.pass(time);
+        self.check_reader()
     }
 
     fn begin_frame(&mut self, arrived: &mut Vec<NodeId>) -> Result<(), TreeError> {

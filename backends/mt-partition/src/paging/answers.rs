@@ -1,0 +1,71 @@
+//! What the store answers.
+
+use vertex_tree::NodeId;
+
+use super::Paging;
+use crate::reader::Answer;
+
+/// A read that has failed is tried again after 1, 2, 4 ... frames, up to this many.
+const LONGEST_PAUSE: u64 = 64;
+
+impl Paging {
+    pub(super) fn arrive(&mut self, answer: Answer, arrived: &mut Vec<NodeId>) {
+        let unit = self.unit_of(answer.nodes.start);
+        let waiting = self.reads.remove(&unit).map(|read| read.waiting).unwrap_or_default();
+        let is_ahead = waiting.is_empty();
+        let mut faults = 0;
+        match answer.records {
+            Err(_) => faults = 1,
+            Ok(records) => {
+                self.stats.reads += 1;
+                self.stats.read_bytes += self.file.bytes(answer.nodes.clone());
+                self.stats.ahead += u64::from(is_ahead);
+                if let Some(foresight) = &mut self.foresight {
+                    foresight.measure(self.frame.saturating_sub(answer.started));
+                }
+                for (node, record) in answer.nodes.clone().zip(records) {
+                    let Ok(record) = record else {
+                        faults += 1;
+                        continue;
+                    };
+                    let bytes = self.bytes_of(node);
+                    let is_new = !self.residents.contains(node);
+                    if self.reserved.remove(&node) || is_new && self.residents.memory().try_reserve(bytes) {
+                        self.residents.insert(node, record, bytes);
+                        let partition = self.file.partition_of(node);
+                        self.partitions[partition as usize].resident += 1;
+                        self.mark(partition);
+                        if let Some(foresight) = self.foresight.as_mut().filter(|_| is_ahead) {
+                            foresight.unused.insert(node);
+                        }
+                        for waiting in &waiting {
+                            if self.groups.get(waiting).is_some_and(|group| group.members.contains(&node)) {
+                                self.residents.pin(node);
+                            }
+                        }
+                    }
+                }
+            }
+        }
+        self.release_reserved(unit);
+        if faults == 0 {
+            self.failures.remove(&unit);
+        } else {
+            self.stats.faults += faults;
+            let (times, from) = self.failures.entry(unit).or_default();
+            *from = self.frame + (1_u64 << *times).min(LONGEST_PAUSE);
+            *times = (*times + 1).min(LONGEST_PAUSE.ilog2());
+        }
+        for node in waiting {
+            let Some(group) = self.groups.get_mut(&node) else { continue };
+            group.reads -= 1;
+            if group.reads == 0 {
+                let members = self.groups.remove(&node).map(|group| group.members).unwrap_or_default();
+                for n in members {
+                    self.residents.unpin(n, self.frame);
+                }
+                arrived.push(NodeId(node));
+            }
+        }
+    }
+}
