@@ -49,7 +49,7 @@ impl Input {
 
     /// Diagonal of the bounding box in object units.
     pub fn extent(&self) -> f64 {
-        if self.positions.len() == 0 { 0.0 } else { (self.high.as_dvec3() - self.low.as_dvec3()).length() }
+        if self.positions.is_empty() { 0.0 } else { (self.high.as_dvec3() - self.low.as_dvec3()).length() }
     }
 }
 
