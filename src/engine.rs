@@ -17,8 +17,10 @@ use vertex_tree::{MeshSink, NodeId, PageStats, TreeError, VertexTree};
 use self::changes::{Counts, Noted, Pending, Steps, Urgent};
 use crate::budget::{Budget, Steering, WorkCap};
 use crate::criterion::Criterion;
+use crate::foresight::{Foresight, Watched};
 use crate::front::Front;
 use crate::motion::{Odometer, Speed};
+use crate::normal_cone::Cones;
 use crate::queue::Kind;
 use crate::refine::{Finder, Flips, Frame, Strategy, Watch, with_strategy};
 use crate::view::View;
@@ -30,6 +32,9 @@ pub struct Settings {
     pub strategy: Strategy,
     /// What "coarse" means.
     pub criterion: Criterion,
+    /// Whether a node is only unfolded for views that do not see all below it from behind, where the backend knows
+    /// ([`VertexTree::HAS_CONES`]).
+    pub normal_cone: bool,
     /// Declared full speed of the camera, `rho` and `omega`; `kappa` is set by the engine.
     pub rho: f64,
     /// See [`Speed::omega`].
@@ -46,6 +51,7 @@ impl Default for Settings {
         Self {
             strategy: Strategy::Event,
             criterion: Criterion::ScreenError,
+            normal_cone: false,
             rho: 1.0,
             omega: 0.02,
             budget: Budget::None,
@@ -63,6 +69,8 @@ pub enum Limit {
     Triangles,
     /// The frame-time budget.
     Time,
+    /// Pages that were not in memory, and for which what is there can not make room.
+    Memory,
     /// Pages that were not in memory.
     Io,
     /// The cap on a frame's work.
@@ -77,6 +85,7 @@ impl Limit {
             Self::Error => "error",
             Self::Triangles => "triangles",
             Self::Time => "time",
+            Self::Memory => "memory",
             Self::Io => "io",
             Self::Work => "work",
         }
@@ -104,6 +113,8 @@ pub struct FrameReport {
     pub blocked: u64,
     /// Wanted changes that the backend refused for want of a page.
     pub misses: u64,
+    /// Nodes that the backend was told to expect a change of, see [`VertexTree::will_need`].
+    pub foreseen: u64,
     /// Active nodes at the end.
     pub active_nodes: u64,
     /// Triangles displayed at the end.
@@ -121,6 +132,7 @@ pub struct Engine<T, M> {
     tree: T,
     mesh: M,
     front: Front,
+    cones: Cones,
     finder: Finder,
     settings: Settings,
     odometer: Odometer,
@@ -140,6 +152,7 @@ pub struct Engine<T, M> {
     urgent: [BinaryHeap<Urgent>; 2],
     arrived: Vec<NodeId>,
     drawing_time: Duration,
+    foresight: Foresight,
 }
 
 impl<T: VertexTree, M: MeshSink> Engine<T, M> {
@@ -156,6 +169,7 @@ impl<T: VertexTree, M: MeshSink> Engine<T, M> {
             views: &[],
             speed: Speed { rho: settings.rho, omega: settings.omega, kappa: 0.0 },
             motion: crate::motion::Motion::Unbounded,
+            cones: None,
         };
         for root in front.roots() {
             with_strategy!(&mut finder, |s| s.watch(&frame, root, Kind::Unfold, front.bounds(root)));
@@ -165,6 +179,7 @@ impl<T: VertexTree, M: MeshSink> Engine<T, M> {
             tree,
             mesh,
             front,
+            cones: Cones::default(),
             finder,
             settings,
             odometer: Odometer::default(),
@@ -183,6 +198,7 @@ impl<T: VertexTree, M: MeshSink> Engine<T, M> {
             urgent: Default::default(),
             arrived: Vec::new(),
             drawing_time: Duration::ZERO,
+            foresight: Foresight::default(),
         })
     }
 
@@ -269,7 +285,8 @@ impl<T: VertexTree, M: MeshSink> Engine<T, M> {
         if redeclared {
             motion = crate::motion::Motion::Unbounded;
         }
-        let frame = Frame { criterion: self.settings.criterion, views: &self.views, speed, motion };
+        let cones = (T::HAS_CONES && self.settings.normal_cone).then_some(&self.cones);
+        let frame = Frame { criterion: self.settings.criterion, views: &self.views, speed, motion, cones };
 
         self.flips.unfold.clear();
         self.flips.fold.clear();
@@ -306,11 +323,23 @@ impl<T: VertexTree, M: MeshSink> Engine<T, M> {
         let apply = found.elapsed();
         self.finder.settle(&frame);
         applied?;
+        let foreseen = match self.tree.look_ahead() {
+            0 => {
+                self.foresight.skip();
+                0
+            }
+            look_ahead => {
+                let unfinished = misses > 0 || counts.carried > 0;
+                let watched = Watched { front: &self.front, finder: &self.finder };
+                self.foresight.look(&mut self.tree, watched, &frame, &self.before, look_ahead, unfinished)
+            }
+        };
         let pages = self.tree.end_frame()?;
         let select = start.elapsed();
 
         let triangles = self.tree.displayed_triangles();
         let limit = match self.steering.budget() {
+            _ if misses > 0 && pages.no_room > 0 => Limit::Memory,
             _ if misses > 0 => Limit::Io,
             _ if counts.carried > 0 => Limit::Work,
             Budget::Triangles(_) if self.steering.limits() => Limit::Triangles,
@@ -330,6 +359,7 @@ impl<T: VertexTree, M: MeshSink> Engine<T, M> {
             carried: counts.carried,
             blocked,
             misses,
+            foreseen,
             active_nodes: self.front.active_nodes() as u64,
             triangles,
             cut_hash: self.front.cut_hash(),

@@ -12,6 +12,8 @@
 use slab::Slab;
 use vertex_tree::{Bounds, NONE, NodeId, VertexTree, prefetch};
 
+use crate::queue::Kind;
+
 /// Where the record of a node in play is. Used again when the node has gone out of play.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
 #[repr(transparent)]
@@ -401,6 +403,18 @@ impl Front {
             for parent in tree.parents(self.node(slot)) {
                 let record = self.record_mut(self.slots[parent.index()]);
                 record.status = record.status.wrapping_add_signed(change);
+            }
+        }
+    }
+
+    /// Calls `f` with every boundary node and every collapsible node.
+    pub(crate) fn for_each_watched(&self, mut f: impl FnMut(Slot, Kind, &Bounds)) {
+        for (pair, Pair(records)) in (0..).zip(&self.pairs) {
+            for (side, record) in (0..).zip(records) {
+                let kind = if record.is_active() { Kind::Fold } else { Kind::Unfold };
+                if record.is_boundary() || record.is_collapsible() {
+                    f(Slot(2 * pair + side), kind, &record.bounds);
+                }
             }
         }
     }

@@ -104,6 +104,15 @@ impl Odometer {
         }
     }
 
+    /// The time after a motion; infinite where no declared speed covers it.
+    pub(crate) fn after(&self, course: &Course, travel: &Travel) -> f64 {
+        match travel.on_course(course) {
+            Motion::Rest => self.now,
+            Motion::Frames(frames) => (self.now + frames).next_up(),
+            Motion::Unbounded => f64::INFINITY,
+        }
+    }
+
     /// Advances by a motion.
     pub(crate) fn advance_by(&mut self, course: &Course, travel: &Travel) -> Motion {
         let motion = travel.on_course(course);

@@ -191,6 +191,7 @@ impl<T: VertexTree, M: MeshSink> Objects<T, M> {
             carried: 0,
             blocked: 0,
             misses: 0,
+            foreseen: 0,
             active_nodes: 0,
             triangles: 0,
             cut_hash: 0,
@@ -237,6 +238,7 @@ fn add(all: &mut FrameReport, report: &FrameReport, number: u64) {
     all.carried += report.carried;
     all.blocked += report.blocked;
     all.misses += report.misses;
+    all.foreseen += report.foreseen;
     all.active_nodes += report.active_nodes;
     all.triangles += report.triangles;
     // The same cut of another object counts as another.

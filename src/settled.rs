@@ -1,24 +1,39 @@
 //! A backend that waits for its pages: for replays whose cuts can be compared in every frame, not for viewers.
 
-use vertex_tree::{Bounds, MeshSink, NodeId, PageStats, Step, TreeError, VertexTree};
+use vertex_tree::{Bounds, MeshSink, NodeId, NormalCone, PageStats, Step, TreeError, VertexTree};
 
 /// Waits inside of a change until what it needs has come. A change that still is refused then, as memory is too small for
 /// it, is a miss.
-pub struct Settled<T>(pub T);
+pub struct Settled<T> {
+    tree: T,
+    waits: bool,
+}
 
 /// A change that is refused more often is left to the next frame.
 const PATIENCE: usize = 100;
 
 impl<T: VertexTree> Settled<T> {
+    /// A backend that waits.
+    #[must_use]
+    pub fn new(tree: T) -> Self {
+        Self { tree, waits: true }
+    }
+
+    /// A backend that does not, and is as it would be without this: so that what replays a path need not care.
+    #[must_use]
+    pub fn in_real_time(tree: T) -> Self {
+        Self { tree, waits: false }
+    }
+
     fn insist(
         &mut self,
         mut change: impl FnMut(&mut T) -> Result<Step, TreeError>,
     ) -> Result<Step, TreeError> {
         for _ in 0..PATIENCE {
-            match change(&mut self.0)? {
-                Step::NotResident => {
-                    self.0.settle()?;
-                    self.0.begin_frame(&mut Vec::new())?;
+            match change(&mut self.tree)? {
+                Step::NotResident if self.waits => {
+                    self.tree.settle()?;
+                    self.tree.begin_frame(&mut Vec::new())?;
                 }
                 step => return Ok(step),
             }
@@ -30,48 +45,52 @@ impl<T: VertexTree> Settled<T> {
 impl<T: VertexTree> VertexTree for Settled<T> {
     const IS_TREE: bool = T::IS_TREE;
     const PREPARATION: usize = T::PREPARATION;
+    const HAS_CONES: bool = T::HAS_CONES;
 
     fn node_limit(&self) -> u32 {
-        self.0.node_limit()
+        self.tree.node_limit()
     }
     fn displayed_triangles(&self) -> u64 {
-        self.0.displayed_triangles()
+        self.tree.displayed_triangles()
     }
     fn roots(&self) -> &[NodeId] {
-        self.0.roots()
+        self.tree.roots()
     }
     fn bounds(&self, node: NodeId) -> Bounds {
-        self.0.bounds(node)
+        self.tree.bounds(node)
     }
     fn children_and_bounds(&self, node: NodeId) -> impl Iterator<Item = (NodeId, Bounds)> {
-        self.0.children_and_bounds(node)
+        self.tree.children_and_bounds(node)
+    }
+    fn normal_cone(&self, node: NodeId) -> NormalCone {
+        self.tree.normal_cone(node)
     }
     fn prepare<M: MeshSink>(&self, node: NodeId, step: usize, mesh: &M) {
-        self.0.prepare(node, step, mesh);
+        self.tree.prepare(node, step, mesh);
     }
     fn look_ahead(&self) -> u32 {
-        self.0.look_ahead()
+        self.tree.look_ahead()
     }
     fn will_need(&mut self, node: NodeId, frames: u32) {
-        self.0.will_need(node, frames);
+        self.tree.will_need(node, frames);
     }
     fn peek(&self, node: NodeId, children: &mut Vec<(NodeId, Bounds)>) -> bool {
-        self.0.peek(node, children)
+        self.tree.peek(node, children)
     }
     fn pass(&mut self, time: std::time::Duration) -> Result<(), TreeError> {
-        self.0.pass(time)
+        self.tree.pass(time)
     }
     fn children(&self, node: NodeId) -> impl Iterator<Item = NodeId> {
-        self.0.children(node)
+        self.tree.children(node)
     }
     fn parents(&self, node: NodeId) -> impl Iterator<Item = NodeId> {
-        self.0.parents(node)
+        self.tree.parents(node)
     }
     fn log_number(&self, node: NodeId) -> u32 {
-        self.0.log_number(node)
+        self.tree.log_number(node)
     }
     fn base_mesh<M: MeshSink>(&mut self, mesh: &mut M) -> Result<(), TreeError> {
-        self.0.base_mesh(mesh)
+        self.tree.base_mesh(mesh)
     }
     fn unfold<M: MeshSink>(&mut self, node: NodeId, mesh: &mut M) -> Result<Step, TreeError> {
         self.insist(|tree| tree.unfold(node, mesh))
@@ -80,12 +99,12 @@ impl<T: VertexTree> VertexTree for Settled<T> {
         self.insist(|tree| tree.fold(node, mesh))
     }
     fn begin_frame(&mut self, arrived: &mut Vec<NodeId>) -> Result<(), TreeError> {
-        self.0.begin_frame(arrived)
+        self.tree.begin_frame(arrived)
     }
     fn settle(&mut self) -> Result<(), TreeError> {
-        self.0.settle()
+        self.tree.settle()
     }
     fn end_frame(&mut self) -> Result<PageStats, TreeError> {
-        self.0.end_frame()
+        self.tree.end_frame()
     }
 }

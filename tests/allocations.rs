@@ -6,6 +6,7 @@ use std::alloc::{GlobalAlloc, Layout, System};
 use std::cell::Cell;
 use std::sync::Arc;
 
+use common::foreseen::Foreseen;
 use common::{Random, bumpy_grid, random_log, random_view, turn};
 use foldfront::active_mesh::ActiveMesh;
 use foldfront::engine::{Engine, Settings};
@@ -45,10 +46,13 @@ static ALLOCATOR: Counting = Counting;
 
 #[test]
 fn a_path_that_has_been_walked_before_allocates_nothing() {
-    for strategy in [Strategy::TopDown, Strategy::Front, Strategy::Event] {
+    let strategies = [Strategy::TopDown, Strategy::Front, Strategy::Event];
+    // With and without looking ahead.
+    for (strategy, look_ahead) in strategies.into_iter().flat_map(|strategy| [(strategy, 0), (strategy, 4)]) {
         let mut random = Random(21);
         let log = random_log(bumpy_grid(40, &mut random), &mut random);
         let tree = InMemoryTree::new(Arc::new(Hierarchy::new(&log).unwrap()));
+        let tree = Foreseen::new(tree, look_ahead);
         let mesh = ActiveMesh::new();
         let settings = Settings { strategy, rho: 0.01, omega: 0.01, ..Settings::default() };
         let mut engine = Engine::new(tree, mesh, settings).unwrap();
@@ -64,18 +68,20 @@ fn a_path_that_has_been_walked_before_allocates_nothing() {
         views[150..].reverse();
         let mut walk = |rounds: usize| {
             let before = ALLOCATIONS.get();
-            let mut changes = 0;
+            let (mut changes, mut foreseen) = (0, 0);
             for view in std::iter::repeat_n(&views, rounds).flatten() {
                 let report = engine.advance(std::slice::from_ref(view)).unwrap();
                 engine.mesh_mut().clear_changes();
                 changes += report.unfolds + report.folds;
+                foreseen += report.foreseen;
             }
-            (ALLOCATIONS.get() - before, changes)
+            (ALLOCATIONS.get() - before, changes, foreseen)
         };
         // Buffers grow to what the path asks for.
-        let (first, _) = walk(200);
-        let (later, changes) = walk(20);
+        let (first, ..) = walk(200);
+        let (later, changes, foreseen) = walk(20);
+        assert_eq!(foreseen > changes / 2, look_ahead > 0, "{strategy:?}: {foreseen} foreseen of {changes}");
         assert!(first > 0 && changes > 1000, "{strategy:?}: {first} allocations, {changes} changes");
-        assert_eq!(later, 0, "{strategy:?}");
+        assert_eq!(later, 0, "{strategy:?}, {look_ahead} frames ahead");
     }
 }

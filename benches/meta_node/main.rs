@@ -1,10 +1,11 @@
 //! Meta-node trees against the in-memory tree and against virtual memory: the tables of El-Sana & Chiang (2000).
 //!
-//! `cargo bench --bench meta_node -- [construction] [selection] [misses] [frames]`; all of them without a word.
+//! `cargo bench --bench meta_node -- [construction] [selection] [working-set] [misses] [frames]`; all of them without a word.
 //!
 //! * `construction`: their Table 1, processor time of the collapse log and of the meta-nodes, sizes of the files, and the
 //!   place holders that levels and pages of other sizes would make.
 //! * `selection`: with memory for everything, against the in-memory tree.
+//! * `working-set`: how many pages recorded paths need at a time, and what fetching on demand misses at least.
 //! * `misses`: along recorded paths, with place holders for shares of the file; every frame lets the pager finish, or
 //!   frames come at 60 a second.
 //! * `frames`: their Table 2, frames against the arrays of the in-memory tree mapped into memory, each in a process of
@@ -18,6 +19,7 @@ mod misses;
 mod selection;
 mod subject;
 mod virtual_memory;
+mod working_set;
 
 fn main() {
     let words: Vec<String> = std::env::args().skip(1).filter(|a| !a.starts_with("--")).collect();
@@ -31,6 +33,9 @@ fn main() {
     }
     if is_chosen("selection") {
         selection::table();
+    }
+    if is_chosen("working-set") {
+        working_set::table();
     }
     if is_chosen("misses") {
         misses::table();

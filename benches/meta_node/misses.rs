@@ -1,94 +1,115 @@
 //! Misses along recorded paths, with place holders for a share of the file.
 //!
 //! A miss is a change that was refused in a frame for want of a page; the percentage is of all changes that were asked
-//! for, made or refused. Counting starts when the first view is settled.
+//! for, made or refused. Counting starts when the first view is settled. Frames come at 60 a second, on virtual time with a
+//! store of a given latency, or in real time from the file on disk.
 
 use std::time::{Duration, Instant};
 
 use foldfront::engine::Engine;
 use foldfront::path::import::Mode;
 use foldfront::refine::Strategy;
-use foldfront::vertex_tree::{NullSink, VertexTree};
-use meta_node::{BuildOptions, InUse, MetaNodeTree, Settings};
+use foldfront::vertex_tree::simulated::Simulated;
+use foldfront::vertex_tree::{NullSink, Prefetch, VertexTree};
+use foldfront::view::View;
+use meta_node::{BuildOptions, InUse, Io, MetaNodeTree, Settings};
 
 use crate::selection::settings;
 use crate::subject::{imported, log, meta_nodes, open, views};
 
-const DRONE: (&str, Mode, f64) = ("euroc_mh04_drone.txt", Mode::Fly, 60.0);
-const CAR: (&str, Mode, f64) = ("kitti_00_car_10hz.txt", Mode::Walk, 30.0);
+pub const DRONE: (&str, Mode, f64) = ("euroc_mh04_drone.txt", Mode::Fly, 60.0);
+pub const CAR: (&str, Mode, f64) = ("kitti_00_car_10hz.txt", Mode::Walk, 30.0);
 
-#[derive(Clone, Copy, PartialEq)]
-enum Pace {
-    /// After every frame, everything that has been asked for arrives.
-    Settled,
-    /// A frame every 1/60 s, whatever has arrived.
-    RealTime,
-}
+/// Mesh, path, and the tolerance in pixels.
+pub const PATHS: [(&str, (&str, Mode, f64), f64); 7] = [
+    ("horse", DRONE, 0.5),
+    ("dragon", DRONE, 1.0),
+    ("happy", DRONE, 1.0),
+    ("denhaag", CAR, 1.0),
+    ("boston", CAR, 1.0),
+    ("sierra", DRONE, 1.0),
+    ("sierra", CAR, 1.0),
+];
+
+const FRAME: Duration = Duration::from_micros(16_667);
+/// In real time, so many frames: 20 seconds.
+const REAL_FRAMES: usize = 1200;
 
 pub fn table() {
     println!(
-        "path   mesh     in use  pace       memory  frames  misses %  frames with a miss %  changes  reads/frame  active"
+        "path   mesh     memory  in use  prefetch  latency    frames  misses %  frames with a miss %  changes  reads/frame  \
+         of these ahead %, used %  no room  active"
     );
-    for (name, (trajectory, mode, rate), pixels) in [
-        ("horse", DRONE, 0.5),
-        ("dragon", DRONE, 1.0),
-        ("denhaag", CAR, 1.0),
-        ("boston", CAR, 1.0),
-        ("sierra", DRONE, 1.0),
-        ("sierra", CAR, 1.0),
-    ] {
+    for (name, (trajectory, mode, rate), pixels) in PATHS {
         let Some((log, _)) = log(name) else { continue };
         let Some(walk) = imported(trajectory, &log, mode, rate) else { continue };
         let path = meta_nodes(name, &log, &BuildOptions::default());
         let bytes = std::fs::metadata(&path).map_or(0, |m| m.len());
         drop(log);
         let views = views(&walk, pixels);
-        for (share, in_use, pace) in [
-            (4, InUse::Yields, Pace::Settled),
-            (4, InUse::Yields, Pace::RealTime),
-            (4, InUse::Stays, Pace::Settled),
-            (16, InUse::Yields, Pace::Settled),
-        ] {
-            let views = if pace == Pace::RealTime { &views[..views.len().min(1200)] } else { &views[..] };
-            let paging = Settings { page_memory: bytes / share, in_use, ..Settings::default() };
-            let Ok(tree) = MetaNodeTree::new(open(&path), paging) else { continue };
-            let mut engine = Engine::new(tree, NullSink, settings(&walk, Strategy::Event)).expect("fine");
-            for _ in 0..2000 {
-                let report = engine.advance(&views[..1]).expect("the store is fine");
-                engine.tree_mut().settle().expect("the store is fine");
-                if report.misses == 0 {
-                    break;
-                }
+        let ways = Prefetch::ALL.map(|prefetch| (InUse::Yields, prefetch));
+        for (parts, latency) in [(4, Some(5)), (4, Some(50)), (4, None), (16, Some(5))] {
+            let stays = Some((InUse::Stays, Prefetch::Paper)).filter(|_| latency == Some(5));
+            for (in_use, prefetch) in ways.into_iter().chain(stays) {
+                let io = latency.map_or(Io::Thread, |latency| {
+                    Io::Simulated(Simulated::with_latency(Duration::from_millis(latency)))
+                });
+                let page_memory = bytes / parts;
+                let paging = Settings { page_memory, in_use, prefetch, io, ..Settings::default() };
+                let Ok(tree) = MetaNodeTree::new(open(&path), paging) else { continue };
+                let engine = Engine::new(tree, NullSink, settings(&walk, Strategy::Event)).expect("fine");
+                let views =
+                    if latency.is_none() { &views[..views.len().min(REAL_FRAMES)] } else { &views[..] };
+                println!(
+                    "{:5}  {name:8} 1/{parts:<4}  {:6}  {:8}  {:9}  {}",
+                    if mode == Mode::Walk { "car" } else { "drone" },
+                    format!("{in_use:?}"),
+                    prefetch.name(),
+                    latency.map_or("real time".to_owned(), |latency| format!("{latency} ms")),
+                    replay(engine, views, latency.is_none())
+                );
             }
-            let (mut misses, mut changes, mut reads, mut missing, mut active) = (0, 0, 0, 0_u32, 0);
-            let mut next = Instant::now();
-            for view in views {
-                if pace == Pace::RealTime {
-                    next += Duration::from_micros(16_667);
-                    std::thread::sleep(next.saturating_duration_since(Instant::now()));
-                }
-                let report = engine.advance(std::slice::from_ref(view)).expect("the store is fine");
-                if pace == Pace::Settled {
-                    engine.tree_mut().settle().expect("the store is fine");
-                }
-                misses += report.misses;
-                changes += report.unfolds + report.folds;
-                reads += report.pages.reads;
-                missing += u32::from(report.misses > 0);
-                active += report.active_nodes;
-            }
-            let frames = views.len() as f64;
-            println!(
-                "{:5}  {name:8} {:6}  {:9}  1/{share:<4}  {:6}  {:8.2}  {:20.1}  {changes:7}  {:11.2}  {:6.0}",
-                if mode == Mode::Walk { "car" } else { "drone" },
-                format!("{in_use:?}"),
-                if pace == Pace::Settled { "settled" } else { "real time" },
-                views.len(),
-                100.0 * misses as f64 / (misses + changes).max(1) as f64,
-                100.0 * f64::from(missing) / frames,
-                reads as f64 / frames,
-                active as f64 / frames,
-            );
         }
     }
+}
+
+/// Follows a path, and says what was missing.
+fn replay(mut engine: Engine<MetaNodeTree, NullSink>, views: &[View], in_real_time: bool) -> String {
+    for _ in 0..2000 {
+        let report = engine.advance(&views[..1]).expect("the store is fine");
+        engine.tree_mut().settle().expect("the store is fine");
+        if report.misses == 0 {
+            break;
+        }
+    }
+    let (mut misses, mut changes, mut missing, mut active) = (0, 0, 0_u32, 0);
+    let (mut reads, mut ahead, mut used, mut no_room) = (0, 0, 0, 0);
+    let mut next = Instant::now();
+    for view in views {
+        if in_real_time {
+            next += FRAME;
+            std::thread::sleep(next.saturating_duration_since(Instant::now()));
+        }
+        let report = engine.advance(std::slice::from_ref(view)).expect("the store is fine");
+        engine.tree_mut().pass(FRAME).expect("the store is fine");
+        misses += report.misses;
+        changes += report.unfolds + report.folds;
+        missing += u32::from(report.misses > 0);
+        active += report.active_nodes;
+        reads += report.pages.reads;
+        ahead += report.pages.ahead;
+        used += report.pages.ahead_used;
+        no_room += report.pages.no_room;
+    }
+    let (frames, percent) = (views.len() as f64, |part: u64, of: u64| 100.0 * part as f64 / of.max(1) as f64);
+    format!(
+        "{:6}  {:8.2}  {:20.1}  {changes:7}  {:11.2}  {:14.0} {:7.0}  {no_room:7}  {:6.0}",
+        views.len(),
+        percent(misses, misses + changes),
+        100.0 * f64::from(missing) / frames,
+        reads as f64 / frames,
+        percent(ahead, reads),
+        percent(used, ahead),
+        active as f64 / frames,
+    )
 }

@@ -99,3 +99,9 @@ pub fn spread(mut values: Vec<f64>) -> [f64; 3] {
     let at = |share: f64| values[((values.len() as f64 * share).ceil() as usize).max(1) - 1];
     [values.iter().sum::<f64>() / values.len() as f64, at(0.5), at(0.99)]
 }
+
+/// A fact of a file that is a number.
+pub fn fact(file: &MetaNodeFile, name: &str) -> u64 {
+    let facts = file.facts();
+    facts.iter().find(|(fact, _)| *fact == name).expect("a known fact").1.parse().expect("a number")
+}

@@ -165,8 +165,12 @@ pub struct MappedTree {
 const HEADER: usize = 64;
 
 impl MappedTree {
-    pub fn open(path: &Path) -> Self {
+    /// `is_random` tells the operating system not to read around what is touched.
+    pub fn open(path: &Path, is_random: bool) -> Self {
         let map = MappedSource::open(path).expect("just written");
+        if is_random {
+            map.expect_random_access().expect("advice is taken");
+        }
         let words: &[u32] = bytemuck::cast_slice(&map.bytes()[..HEADER]);
         let counts: [usize; 6] = std::array::from_fn(|i| words[i] as usize);
         let mut tree = Self {

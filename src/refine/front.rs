@@ -29,6 +29,11 @@ impl FrontScan {
         scan(&self.unfolded, Kind::Fold, lenses.as_ref().map(Lenses::as_slice), frame, &mut flips.fold);
     }
 
+    /// What is watched, boundary nodes and collapsible nodes; tags are slots.
+    pub fn watched(&self) -> [(&Packed, Kind); 2] {
+        [(&self.folded, Kind::Unfold), (&self.unfolded, Kind::Fold)]
+    }
+
     fn put(&mut self, slot: Slot, kind: Kind, bounds: Bounds) {
         if self.place.len() <= slot.index() {
             self.place.resize(slot.index() + 1, 0);
@@ -39,6 +44,11 @@ impl FrontScan {
             let at = packed.len() as u32 - 1;
             self.place[slot.index()] = 2 * at + u32::from(kind == Kind::Fold) + 2;
         }
+    }
+
+    /// What is watched, boundary nodes and collapsible nodes; tags are slots.
+    pub fn watched(&self) -> [(&Packed, Kind); 2] {
+        [(&self.folded, Kind::Unfold), (&self.unfolded, Kind::Fold)]
     }
 
     fn packed(&mut self, unfolded: bool) -> &mut Packed {
@@ -73,13 +83,16 @@ fn scan(packed: &Packed, kind: Kind, lenses: Option<&[Lens]>, frame: &Frame, fli
             // A boundary node flips unless it is certainly not wanted, a collapsible one unless it certainly is.
             Some(lenses) => match kind {
                 Kind::Unfold => doubtful(&certainly::<false>(block, lenses), used),
+                // The filter knows of no cones: what it is certain of may be seen from behind.
+                Kind::Fold if frame.cones.is_some() => (1 << used) - 1,
                 Kind::Fold => doubtful(&certainly::<true>(block, lenses), used),
             },
             None => (1 << used) - 1,
         };
         for_each_bit(mask, |lane| {
-            if frame.unfold(&block.bounds(lane)) == (kind == Kind::Unfold) {
-                flips.push(Slot(block.tag[lane]));
+            let slot = Slot(block.tag[lane]);
+            if frame.unfold(slot, &block.bounds(lane)) == (kind == Kind::Unfold) {
+                flips.push(slot);
             }
         });
     }

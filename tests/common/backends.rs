@@ -47,19 +47,22 @@ const BACKENDS: [(&str, Open); 6] = [
     // The multi-triangulation as it is, whose nodes are the collapses, and reduced, where they are groups of them.
     ("mt-partition unreduced", |log, settings| {
         let file = graph_cut::file(log, &BuildOptions { patch: 0.0, ..BuildOptions::default() });
-        follow(settings, || Settled(MtTree::new(file.clone(), mt_partition::Settings::default()).unwrap()))
+        follow(settings, || {
+            Settled::new(MtTree::new(file.clone(), mt_partition::Settings::default()).unwrap())
+        })
     }),
     ("mt-partition", |log, settings| {
         let file = graph_cut::file(log, &BuildOptions::default());
-        let tree = || Settled(MtTree::new(file.clone(), mt_partition::Settings::default()).unwrap());
+        let tree = || Settled::new(MtTree::new(file.clone(), mt_partition::Settings::default()).unwrap());
         let engine = |&settings: &Settings| Engine::new(tree(), NullSink, settings).unwrap();
         let cut = Rc::new(RefCell::new(GraphCut::new(&file)));
         let own = |settings| OwnGraph { engine: engine(settings), cut: cut.clone() };
         settings.iter().map(|settings| Box::new(own(settings)) as Box<dyn Follower>).collect()
     }),
-    // As in the paper, where frames wait for blocks; and quantised, by an I/O thread that is waited for.
-    ("detail-block", |log, settings| detail::follow(log, settings, false)),
-    ("detail-block quantised", |log, settings| detail::follow(log, settings, true)),
+    // As in the paper, where frames wait for blocks; and quantised, by an I/O thread that is waited for, with the
+    // normal-cone test.
+    ("detail-block", |log, settings| detail::follow(log, settings, false, false)),
+    ("detail-block quantised, normal cone", |log, settings| detail::follow(log, settings, true, true)),
 ];
 
 /// The hierarchy as a file of meta-nodes, kept in memory.

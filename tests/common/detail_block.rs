@@ -7,7 +7,7 @@ use std::cell::RefCell;
 use std::rc::Rc;
 use std::sync::Arc;
 
-use detail_block::{Arrangement, BuildOptions, Loading, XfmFile, XfmTree};
+use detail_block::{Arrangement, BuildOptions, Io, XfmFile, XfmTree};
 use foldfront::CollapseLog;
 use foldfront::budget::Budget;
 use foldfront::engine::{Engine, FrameReport, Settings};
@@ -24,9 +24,9 @@ pub fn options(quantize: bool, nest_needs: bool) -> BuildOptions {
     BuildOptions { quantize, nest_needs, ..BuildOptions::default() }
 }
 
-/// Settings of a tree that loads in this way, without quotas.
-pub fn loading(loading: Loading) -> detail_block::Settings {
-    detail_block::Settings { loading, ..detail_block::Settings::default() }
+/// Settings of a tree that reads in this way, without quotas.
+pub fn reading(io: Io) -> detail_block::Settings {
+    detail_block::Settings { io, ..detail_block::Settings::default() }
 }
 
 /// The file that an arrangement makes.
@@ -99,13 +99,27 @@ struct Own {
 }
 
 /// Trees over one file, one for each of the settings.
-pub fn follow(log: &CollapseLog, settings: &[Settings], quantize: bool) -> Vec<Box<dyn Follower>> {
+pub fn follow(
+    log: &CollapseLog,
+    settings: &[Settings],
+    quantize: bool,
+    normal_cone: bool,
+) -> Vec<Box<dyn Follower>> {
     let arrangement = Arrangement::new(log, &options(quantize, true)).unwrap();
     let file = file(&arrangement);
-    let cut = Rc::new(RefCell::new(OwnCut::new(&arrangement.effective_log())));
-    let how = loading(if quantize { Loading::Background } else { Loading::Blocking });
+    let mut cut = OwnCut::new(&arrangement.effective_log());
+    if normal_cone {
+        cut.oracle = cut.oracle.with_cones(arrangement.cones());
+    }
+    let cut = Rc::new(RefCell::new(cut));
+    let how = reading(if quantize { Io::Background } else { Io::Blocking });
     let own = |&settings: &Settings| Own {
-        engine: Engine::new(XfmTree::new(file.clone(), how).unwrap(), NullSink, settings).unwrap(),
+        engine: Engine::new(
+            XfmTree::new(file.clone(), how).unwrap(),
+            NullSink,
+            Settings { normal_cone, ..settings },
+        )
+        .unwrap(),
         cut: cut.clone(),
     };
     settings.iter().map(|settings| Box::new(own(settings)) as Box<dyn Follower>).collect()

@@ -4,6 +4,7 @@
 pub mod backends;
 pub mod data;
 pub mod detail_block;
+pub mod foreseen;
 pub mod graph_cut;
 pub mod sink;
 

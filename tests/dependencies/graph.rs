@@ -306,6 +306,12 @@ impl VertexTree for GraphTree {
         Ok(Step::Done)
     }
 
+    fn peek(&self, node: NodeId, children: &mut Vec<(NodeId, Bounds)>) -> bool {
+        let below = &self.graph.children[node.index()];
+        children.extend(below.iter().map(|&child| (child, self.graph.bounds[child.index()])));
+        true
+    }
+
     fn begin_frame(&mut self, arrived: &mut Vec<NodeId>) -> Result<(), TreeError> {
         self.frame += 1;
         self.log.borrow_mut().refused.clear();

@@ -6,8 +6,10 @@ mod common;
 mod graph;
 
 use std::cell::RefCell;
+use std::collections::BTreeMap;
 use std::rc::Rc;
 
+use common::foreseen::Foreseen;
 use common::{Random, random_step, random_view};
 use foldfront::engine::{Engine, Settings};
 use foldfront::front::mix;
@@ -119,6 +121,45 @@ fn a_node_may_have_several_parents() {
 fn what_a_node_needs_is_forced_and_folds_when_nothing_needs_it() {
     let (forced, named, still_needed) = assert_exact(30);
     assert!(forced > 1000 && named > 1000 && still_needed > 100, "{forced}, {named}, {still_needed}");
+}
+
+/// Where nodes have several parents, each is named once, at the first instant at which it is wrong, whatever leads to it;
+/// and a camera that goes on as it did is foreseen exactly.
+#[test]
+fn what_several_parents_lead_to_is_foreseen_once() {
+    let (mut right, mut wrong) = (0, 0);
+    for (seed, graph) in shapes(0) {
+        for strategy in EXACT {
+            let settings = Settings { strategy, rho: 0.02, ..Settings::default() };
+            let tree = Foreseen::new(GraphTree::new(graph.clone(), None), 4);
+            let mut engine = Engine::new(tree, NullSink, settings).unwrap();
+            let mut random = Random(seed + 300);
+            let start = random_view(&mut random);
+            let step = random.direction() * 0.01;
+            let at = |frame: u32| View { eye: start.eye + step * f64::from(frame), ..start };
+            for frame in 0..80 {
+                engine.advance(&[at(frame)]).unwrap();
+                let named: BTreeMap<u32, u32> =
+                    engine.tree().named.iter().map(|&(node, frames)| (node.0, frames)).collect();
+                assert_eq!(named.len(), engine.tree().named.len(), "{}: named twice", strategy.name());
+                let cut = |frame| graph.cut(settings.criterion, &[at(frame)]);
+                let now = cut(frame);
+                let mut expected = BTreeMap::new();
+                for instant in [1, 2, 4] {
+                    let then = cut(frame + instant);
+                    for n in (0..now.len()).filter(|&n| then[n] != now[n]) {
+                        expected.entry(n as u32).or_insert(instant);
+                    }
+                }
+                if frame >= 3 {
+                    right += named.iter().filter(|(node, frames)| expected.get(node) == Some(frames)).count();
+                    wrong += named.iter().filter(|(node, frames)| expected.get(node) != Some(frames)).count();
+                    wrong += expected.keys().filter(|node| !named.contains_key(node)).count();
+                }
+            }
+        }
+    }
+    assert!(right > 1000 && wrong * 1000 <= right, "{right} foreseen, {wrong} not or wrongly");
 }
 
 /// Pages come late. The cut may lag behind, but not after a rest, and nothing that was refused is forgotten.

@@ -50,10 +50,14 @@ pub(crate) struct Block {
     /// Which child blocks there are, as stored.
     pub children: u32,
     /// How many of the nodes are active.
-    pub active: u32,
+    pub active: u16,
+    /// Whether it was loaded ahead of time and no change has made use of it yet.
+    pub is_unused: bool,
     /// When it became a candidate for removal, in frames, and the last frame that made use of it.
     pub stamp: u64,
     pub used: u64,
+    /// When it left play, 0 while it has not.
+    pub left: u64,
     pub nodes: Box<[Node]>,
 }
 
@@ -128,8 +132,10 @@ impl Block {
             first_child,
             children,
             active: 0,
+            is_unused: false,
             stamp: 0,
             used: 0,
+            left: 0,
             nodes,
         })
     }

@@ -1,14 +1,19 @@
-//! The I/O thread: reads and inflates blocks while frames go on.
+//! What reads blocks while frames go on: an I/O thread, or a line on virtual time.
 //!
-//! A tree that loads in the background owns one thread. It takes requests, those that a frame has missed before those
-//! that are only ahead of time, reads from the file's source, and leaves blocks for the tree to take at the start of a frame.
-//! Everything else belongs to the tree's own thread. The two share one lock, which is never held during a read.
+//! Both take requests from a [`Queue`], those that a frame has missed before those that are only foreseen, read from the
+//! file's source, and leave blocks for the tree to take at the start of a frame. Everything else belongs to the tree's
+//! own thread.
+//!
+//! * A tree that loads in the background owns one thread. The two share one lock, which is never held during a read.
+//! * On virtual time there is no thread: whoever lets time pass reads and inflates what has ended by then.
 
 use std::collections::VecDeque;
 use std::sync::Arc;
 use std::thread::JoinHandle;
+use std::time::Duration;
 
 use parking_lot::{Condvar, Mutex};
+use vertex_tree::simulated::{Line, Reads, Simulated};
 
 use crate::block::Block;
 use crate::error::XfmError;
@@ -21,9 +26,32 @@ pub(crate) struct Run {
     pub count: u32,
 }
 
+impl Run {
+    pub fn numbers(self) -> std::ops::Range<u32> {
+        self.first..self.first + self.count
+    }
+
+    /// Where it is in the file, and how many bytes it has there.
+    fn place(self, file: &XfmFile) -> (u64, u64) {
+        let (offset, _) = file.place(self.first);
+        let (last, length) = file.place(self.first + self.count - 1);
+        (offset, last + length - offset)
+    }
+}
+
+/// A run that is wanted, and the frame in which it was: that of the demand, or, for one that was foreseen, that in which
+/// reading began.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Request {
+    run: Run,
+    frame: u64,
+}
+
 /// What became of a run.
 pub(crate) struct Answer {
     pub run: Run,
+    /// See [`Request`].
+    pub frame: u64,
     /// Bytes read, 0 if reading failed.
     pub bytes: u64,
     /// Of each block; or one error for all.
@@ -31,14 +59,13 @@ pub(crate) struct Answer {
 }
 
 /// Reads a run with one read and inflates its blocks.
-pub(crate) fn read_run(file: &XfmFile, run: Run, buffer: &mut Vec<u8>) -> Answer {
-    let (offset, _) = file.place(run.first);
-    let (last, length) = file.place(run.first + run.count - 1);
-    let length = last + length - offset;
+pub(crate) fn read_run(file: &XfmFile, run: Run, frame: u64, buffer: &mut Vec<u8>) -> Answer {
+    let (offset, length) = run.place(file);
     buffer.resize(length as usize, 0);
     let blocks = match file.source().read_at(offset, buffer) {
         Err(source) => Err(XfmError::Read { file: file.name().to_owned(), offset, length, source }),
-        Ok(()) => Ok((run.first..run.first + run.count)
+        Ok(()) => Ok(run
+            .numbers()
             .map(|block| {
                 let (start, length) = file.place(block);
                 let start = (start - offset) as usize;
@@ -47,16 +74,36 @@ pub(crate) fn read_run(file: &XfmFile, run: Run, buffer: &mut Vec<u8>) -> Answer
             })
             .collect()),
     };
-    Answer { run, bytes: if blocks.is_ok() { length } else { 0 }, blocks }
+    Answer { run, frame, bytes: if blocks.is_ok() { length } else { 0 }, blocks }
 }
 
+/// What is wanted and has not been started, and what has been read.
 #[derive(Default)]
 struct Queue {
-    urgent: VecDeque<Run>,
-    ahead: VecDeque<Run>,
+    urgent: VecDeque<Request>,
+    ahead: VecDeque<Request>,
     done: Vec<Answer>,
+    /// The tree's frame.
+    frame: u64,
     is_reading: bool,
     is_closed: bool,
+}
+
+impl Queue {
+    fn next(&mut self) -> Option<Request> {
+        let frame = self.frame;
+        let ahead = &mut self.ahead;
+        self.urgent.pop_front().or_else(|| Some(Request { frame, ..ahead.pop_front()? }))
+    }
+
+    fn hurry(&mut self, block: u32) {
+        let holds = |request: &Request| request.run.numbers().contains(&block);
+        if let Some(at) = self.ahead.iter().position(holds)
+            && let Some(request) = self.ahead.remove(at)
+        {
+            self.urgent.push_back(Request { frame: self.frame, ..request });
+        }
+    }
 }
 
 struct Shared {
@@ -67,15 +114,112 @@ struct Shared {
     rest: Condvar,
 }
 
+/// What a line on virtual time reads.
+pub(crate) struct OnLine {
+    file: Arc<XfmFile>,
+    queue: Queue,
+    buffer: Vec<u8>,
+}
+
+impl Reads for OnLine {
+    type Read = Request;
+
+    fn start(&mut self) -> Option<(Request, u64)> {
+        let request = self.queue.next()?;
+        Some((request, request.run.place(&self.file).1))
+    }
+
+    fn end(&mut self, Request { run, frame }: Request) {
+        self.queue.done.push(read_run(&self.file, run, frame, &mut self.buffer));
+    }
+}
+
+/// What reads for a tree.
+pub(crate) enum Loader {
+    Thread(Thread),
+    Line(Box<(Line<Request>, OnLine)>),
+}
+
+impl Loader {
+    /// Starts a thread.
+    pub fn thread(file: Arc<XfmFile>) -> std::io::Result<Self> {
+        Ok(Self::Thread(Thread::start(file)?))
+    }
+
+    /// A store on virtual time.
+    pub fn simulated(file: Arc<XfmFile>, store: Simulated) -> Self {
+        let on_line = OnLine { file, queue: Queue::default(), buffer: Vec::new() };
+        Self::Line(Box::new((Line::new(store), on_line)))
+    }
+
+    fn with_queue<R>(&mut self, f: impl FnOnce(&mut Queue) -> R) -> R {
+        match self {
+            Self::Thread(thread) => f(&mut thread.shared.queue.lock()),
+            Self::Line(line) => f(&mut line.1.queue),
+        }
+    }
+
+    /// Asks for a run.
+    pub fn ask(&mut self, run: Run, is_urgent: bool) {
+        self.with_queue(|queue| {
+            let request = Request { run, frame: queue.frame };
+            if is_urgent {
+                queue.urgent.push_back(request);
+            } else {
+                queue.ahead.push_back(request);
+            }
+        });
+        if let Self::Thread(thread) = self {
+            thread.shared.work.notify_one();
+        }
+    }
+
+    /// Says that a run asked for ahead of time is missed now.
+    pub fn hurry(&mut self, block: u32) {
+        self.with_queue(|queue| queue.hurry(block));
+    }
+
+    /// Takes back what was asked for ahead of time, was not missed since and has not been started.
+    pub fn withdraw(&mut self, runs: &mut Vec<Run>) {
+        self.with_queue(|queue| runs.extend(queue.ahead.drain(..).map(|request| request.run)));
+    }
+
+    /// A frame begins: takes what has been read.
+    pub fn take(&mut self, frame: u64, answers: &mut Vec<Answer>) {
+        self.with_queue(|queue| {
+            queue.frame = frame;
+            answers.append(&mut queue.done);
+        });
+    }
+
+    /// Lets time pass, if it is virtual.
+    pub fn pass(&mut self, time: Duration) {
+        if let Self::Line(line) = self {
+            let (line, reads) = &mut **line;
+            line.pass(time, reads);
+        }
+    }
+
+    /// Waits until everything asked for has been read or has failed.
+    pub fn settle(&mut self) {
+        match self {
+            Self::Thread(thread) => thread.settle(),
+            Self::Line(line) => {
+                let (line, reads) = &mut **line;
+                line.settle(reads);
+            }
+        }
+    }
+}
+
 /// The I/O thread of a tree.
-pub(crate) struct Loader {
+pub(crate) struct Thread {
     shared: Arc<Shared>,
     thread: Option<JoinHandle<()>>,
 }
 
-impl Loader {
-    /// Starts the thread.
-    pub fn start(file: Arc<XfmFile>) -> std::io::Result<Self> {
+impl Thread {
+    fn start(file: Arc<XfmFile>) -> std::io::Result<Self> {
         let queue = Mutex::new(Queue::default());
         let shared = Arc::new(Shared { queue, work: Condvar::new(), rest: Condvar::new() });
         let its = shared.clone();
@@ -84,35 +228,7 @@ impl Loader {
         Ok(Self { shared, thread: Some(thread) })
     }
 
-    /// Asks for a run.
-    pub fn ask(&self, run: Run, is_urgent: bool) {
-        let mut queue = self.shared.queue.lock();
-        if is_urgent {
-            queue.urgent.push_back(run);
-        } else {
-            queue.ahead.push_back(run);
-        }
-        self.shared.work.notify_one();
-    }
-
-    /// Says that a run asked for ahead of time is missed now.
-    pub fn hurry(&self, block: u32) {
-        let mut queue = self.shared.queue.lock();
-        let holds = |run: &Run| (run.first..run.first + run.count).contains(&block);
-        if let Some(at) = queue.ahead.iter().position(holds)
-            && let Some(run) = queue.ahead.remove(at)
-        {
-            queue.urgent.push_back(run);
-        }
-    }
-
-    /// Takes what has been read.
-    pub fn take(&self, answers: &mut Vec<Answer>) {
-        answers.append(&mut self.shared.queue.lock().done);
-    }
-
-    /// Waits until everything asked for has been read or has failed.
-    pub fn settle(&self) {
+    fn settle(&self) {
         let mut queue = self.shared.queue.lock();
         while queue.is_reading || !queue.urgent.is_empty() || !queue.ahead.is_empty() {
             self.shared.rest.wait(&mut queue);
@@ -120,7 +236,7 @@ impl Loader {
     }
 }
 
-impl Drop for Loader {
+impl Drop for Thread {
     fn drop(&mut self) {
         self.shared.queue.lock().is_closed = true;
         self.shared.work.notify_one();
@@ -135,14 +251,14 @@ fn work(file: &XfmFile, shared: &Shared) {
     let mut buffer = Vec::new();
     let mut queue = shared.queue.lock();
     while !queue.is_closed {
-        let Some(run) = queue.urgent.pop_front().or_else(|| queue.ahead.pop_front()) else {
+        let Some(Request { run, frame }) = queue.next() else {
             shared.rest.notify_all();
             shared.work.wait(&mut queue);
             continue;
         };
         queue.is_reading = true;
         drop(queue);
-        let answer = read_run(file, run, &mut buffer);
+        let answer = read_run(file, run, frame, &mut buffer);
         queue = shared.queue.lock();
         queue.is_reading = false;
         queue.done.push(answer);

@@ -5,16 +5,27 @@ use vertex_tree::{NONE, NodeId, PageStats};
 use crate::block::resident_bytes;
 use crate::paging::{Paging, SOON, Stub};
 
+/// What a change has missed is needed in so many frames.
+pub(crate) const NOW: u32 = 0;
+
 impl Paging {
     /// A block may have become a candidate for removal.
     pub fn may_go(&mut self, number: u32) {
         if self.is_candidate(number) {
             let frame = self.frame;
+            let in_play = self.is_in_play(number);
+            let mut leaves = false;
             if let Some(block) = self.block_mut(number) {
                 block.stamp = frame;
+                leaves = !in_play && block.left == 0;
+                if leaves {
+                    block.left = frame;
+                }
             }
-            let which = usize::from(self.is_in_play(number));
-            self.candidates[which].push_back((frame, number));
+            if leaves {
+                self.returns.left(frame);
+            }
+            self.candidates[usize::from(in_play)].push_back((frame, number));
         }
     }
 
@@ -39,7 +50,7 @@ impl Paging {
     }
 
     /// Of the candidates that are out of play, or of those in play, the one that was used least recently, taken out of its
-    /// queue, if nothing has used it since a frame.
+    /// queue, if nothing has used it since a frame or will as far as can be foreseen.
     fn next_candidate(&mut self, in_play: bool, unused_since: u64) -> Option<u32> {
         let which = usize::from(in_play);
         while let Some(&(stamp, number)) = self.candidates[which].front() {
@@ -53,7 +64,7 @@ impl Paging {
                 continue;
             }
             let is_unused = self.block(number).is_some_and(|block| block.used < unused_since);
-            if is_unused && self.is_in_play(number) == in_play {
+            if is_unused && self.is_in_play(number) == in_play && !self.foresight.holds(number) {
                 return Some(number);
             }
             self.may_go(number);
@@ -61,9 +72,27 @@ impl Paging {
         None
     }
 
-    /// A candidate to make room below the hard quota: one in play if there is no other.
-    fn any_candidate(&mut self) -> Option<u32> {
-        self.next_candidate(false, self.frame).or_else(|| self.next_candidate(true, self.frame))
+    /// Whether the candidate whose turn it is beyond the soft quota is expected back soon. Those behind it left later.
+    fn expects_next(&self) -> bool {
+        let Some(&(stamp, number)) = self.candidates[0].front() else { return false };
+        let next = self.block(number).filter(|block| block.stamp == stamp && block.left != 0);
+        next.is_some_and(|block| self.returns.expects(block.left, self.frame, self.grace))
+    }
+
+    /// A candidate to make room below the hard quota for what is needed in so many frames: one in play if there is no
+    /// other, and one that is foreseen if there is none of those either.
+    fn any_candidate(&mut self, unused_since: u64, due: u32) -> Option<u32> {
+        let unforeseen = self.next_candidate(false, unused_since);
+        if let Some(number) = unforeseen.or_else(|| self.next_candidate(true, unused_since)) {
+            return Some(number);
+        }
+        while let Some(number) = self.foresight.farthest(due) {
+            let is_unused = self.block(number).is_some_and(|block| block.used < unused_since);
+            if is_unused && self.is_candidate(number) {
+                return Some(number);
+            }
+        }
+        None
     }
 
     fn remove(&mut self, number: u32) {
@@ -75,7 +104,7 @@ impl Paging {
             self.stubs.insert(number, stub);
         }
         self.counts.removals += 1;
-        self.removed_at.insert(number, self.frame);
+        self.removed_at.insert(number, (self.frame, block.left));
         self.removed.push_back((self.frame, number));
     }
 
@@ -87,10 +116,20 @@ impl Paging {
         }
     }
 
-    /// Makes room for so many bytes below the hard quota.
-    pub fn make_room(&mut self, bytes: u64) -> bool {
-        while (self.bytes + self.reserved).saturating_add(bytes) > self.hard {
-            match self.any_candidate() {
+    /// Makes room below the hard quota for so many bytes, which are needed in so many frames.
+    ///
+    /// What a change has made use of in the last frame stays: a change that waits for more than one block asks for them in
+    /// every frame, so that what has come for it is still there when the rest does. With a camera at rest a block that
+    /// has come for a change is thus not removed for another, and as every change that is made lets the front sink,
+    /// loading comes to an end, whatever the quota.
+    pub fn make_room(&mut self, bytes: u64, due: u32) -> bool {
+        let fits = |paging: &Self| (paging.bytes + paging.reserved).saturating_add(bytes) <= paging.hard;
+        while !fits(self) {
+            // What has not been started takes no room from what is missed.
+            if due == NOW && self.withdraw() {
+                continue;
+            }
+            match self.any_candidate(self.frame.saturating_sub(1), due) {
                 Some(number) => self.remove(number),
                 None => return false,
             }
@@ -101,20 +140,22 @@ impl Paging {
     /// Removes candidates beyond the quotas.
     pub fn end_frame(&mut self) -> PageStats {
         while self.bytes + self.reserved > self.hard
-            && let Some(number) = self.any_candidate()
+            && let Some(number) = self.any_candidate(self.frame, NOW)
         {
             self.remove(number);
         }
-        while self.bytes > self.soft
-            && let Some(number) = self.next_candidate(false, self.frame.saturating_sub(self.grace))
-        {
+        while self.bytes > self.soft && !self.expects_next() {
+            let Some(number) = self.next_candidate(false, self.frame.saturating_sub(self.grace)) else {
+                break;
+            };
             self.remove(number);
         }
+        self.returns.end_frame(self.frame, self.grace);
         while let Some(&(at, number)) = self.removed.front()
             && at + SOON < self.frame
         {
             self.removed.pop_front();
-            if self.removed_at.get(&number) == Some(&at) {
+            if self.removed_at.get(&number).is_some_and(|&(last, _)| last == at) {
                 self.removed_at.remove(&number);
             }
         }

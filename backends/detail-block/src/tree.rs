@@ -11,8 +11,11 @@
 //! For a sink that does not keep the mesh none is kept here either: what is displayed follows from the nodes.
 
 use std::sync::Arc;
+use std::time::Duration;
 
-use vertex_tree::{Bounds, MeshSink, NONE, NodeId, PageStats, Step, TreeError, VertexTree};
+use vertex_tree::{
+    Bounds, MeshSink, NONE, NodeId, NormalCone, PageStats, Prefetch, Step, TreeError, VertexTree,
+};
 
 use crate::block::ACTIVE;
 use crate::error::XfmError;
@@ -20,8 +23,9 @@ use crate::file::XfmFile;
 use crate::half_edges::{Adjacent, BOUNDARY, HalfEdge};
 use crate::loader::Loader;
 use crate::numbering::{Owner, owner};
-use crate::paging::{Paging, PagingCounts, tree_error};
-use crate::settings::{Loading, Settings};
+use crate::paging::{Paging, PagingCounts};
+use crate::requests::tree_error;
+use crate::settings::{Io, Settings};
 use crate::shown::Shown;
 
 /// A front through an XFM file.
@@ -30,13 +34,8 @@ pub struct XfmTree {
     roots: Vec<NodeId>,
     pub(crate) shown: Option<Shown>,
     pub(crate) displayed: u64,
-    loads_ahead: bool,
-    /// Nodes near which blocks are loaded ahead of time at the end of the frame, and in how many ticks they may be due.
-    ahead: Vec<(u32, NodeId)>,
+    foresees: bool,
 }
-
-/// Nodes that are looked at for loading ahead in one frame.
-const MOST_AHEAD: usize = 1024;
 
 impl XfmTree {
     /// A tree with every node folded.
@@ -44,11 +43,11 @@ impl XfmTree {
     /// # Errors
     /// If the I/O thread can not be started.
     pub fn new(file: Arc<XfmFile>, settings: Settings) -> Result<Self, XfmError> {
-        let name = file.name().to_owned();
-        let loader = match settings.loading {
-            Loading::Blocking => None,
-            _ => Some(Loader::start(file.clone()).map_err(|source| XfmError::Read {
-                file: name,
+        let loader = match settings.io {
+            Io::Blocking => None,
+            Io::Simulated(store) => Some(Loader::simulated(file.clone(), store)),
+            Io::Background => Some(Loader::thread(file.clone()).map_err(|source| XfmError::Read {
+                file: file.name().to_owned(),
                 offset: 0,
                 length: 0,
                 source,
@@ -56,8 +55,8 @@ impl XfmTree {
         };
         let roots = file.roots().iter().map(|&(root, _)| root).collect();
         let paging = Paging::new(file, loader, &settings);
-        let loads_ahead = settings.loading == Loading::Background;
-        Ok(Self { paging, roots, shown: None, displayed: 0, loads_ahead, ahead: Vec::new() })
+        let foresees = settings.prefetch == Prefetch::Schedule && settings.io != Io::Blocking;
+        Ok(Self { paging, roots, shown: None, displayed: 0, foresees })
     }
 
     /// The file.
@@ -81,12 +80,6 @@ impl XfmTree {
     #[must_use]
     pub fn counts(&self) -> PagingCounts {
         self.paging.counts
-    }
-
-    /// Normal and sine of the normal cone of a node whose block is in memory; a sine above 1 is no cone.
-    #[must_use]
-    pub fn normal_cone(&self, node: NodeId) -> Option<([f32; 3], f32)> {
-        self.paging.node(node).map(|node| (node.stored.normal, node.stored.sine))
     }
 
     fn damaged(&self, node: NodeId, reason: &'static str) -> TreeError {
@@ -150,6 +143,7 @@ fn brought(adjacent: [u32; 4]) -> u64 {
 
 impl VertexTree for XfmTree {
     const IS_TREE: bool = true;
+    const HAS_CONES: bool = true;
 
     fn node_limit(&self) -> u32 {
         (self.paging.file.header().blocks as u32) << self.paging.file.levels().get()
@@ -172,6 +166,14 @@ impl VertexTree for XfmTree {
         let stub = || self.paging.stub(file.levels().block(node)).map(|stub| stub.bounds);
         let bounds = listed.map_or_else(|_| stub(), |i| Some(file.roots()[i].1));
         bounds.unwrap_or(Bounds { center: [0.0; 3], radius: 0.0, eps: 0.0 })
+    }
+
+    fn normal_cone(&self, node: NodeId) -> NormalCone {
+        match self.paging.node(node) {
+            Some(found) if self.parents(node).next().is_some() => found.stored.cone(),
+            // The root list has no room for cones, so roots have none.
+            _ => NormalCone::NONE,
+        }
     }
 
     #[inline]
@@ -268,9 +270,6 @@ impl VertexTree for XfmTree {
             block.active += 1;
         }
         self.displayed += brought(adjacent);
-        if self.loads_ahead && self.ahead.len() < MOST_AHEAD {
-            self.ahead.push((0, node));
-        }
         Ok(Step::Done)
     }
 
@@ -306,10 +305,23 @@ impl VertexTree for XfmTree {
         Ok(Step::Done)
     }
 
-    fn will_need(&mut self, node: NodeId, ticks: u32) {
-        if self.loads_ahead && self.ahead.len() < MOST_AHEAD {
-            self.ahead.push((ticks, node));
+    fn look_ahead(&self) -> u32 {
+        if self.foresees { self.paging.foresight.frames() } else { 0 }
+    }
+
+    fn will_need(&mut self, node: NodeId, frames: u32) {
+        if self.foresees {
+            self.paging.foresee(node, frames);
         }
+    }
+
+    fn peek(&self, node: NodeId, children: &mut Vec<(NodeId, Bounds)>) -> bool {
+        self.paging.peek(node, children)
+    }
+
+    fn pass(&mut self, time: Duration) -> Result<(), TreeError> {
+        self.paging.pass(time);
+        Ok(())
     }
 
     fn begin_frame(&mut self, arrived: &mut Vec<NodeId>) -> Result<(), TreeError> {
@@ -322,24 +334,9 @@ impl VertexTree for XfmTree {
     }
 
     fn end_frame(&mut self) -> Result<PageStats, TreeError> {
-        let levels = self.paging.file.levels();
-        let mut ahead = std::mem::take(&mut self.ahead);
-        ahead.sort_unstable();
-        for (_, node) in ahead.drain(..) {
-            // The node's own block, if it has been removed; what unfolding it takes; and what its children would take.
-            let number = levels.block(node);
-            self.paging.ask_ahead(number..number + 1);
-            self.paging.ask_ahead(self.paging.child_blocks(node).unwrap_or_default());
-            let children: [Option<NodeId>; 2] = {
-                let mut children = self.children(node);
-                [children.next(), children.next()]
-            };
-            for child in children.into_iter().flatten() {
-                let below = self.paging.child_blocks(child).unwrap_or_default();
-                self.paging.ask_ahead(below);
-            }
+        if self.foresees {
+            self.paging.ask_for_foreseen();
         }
-        self.ahead = ahead;
         Ok(self.paging.end_frame())
     }
 }

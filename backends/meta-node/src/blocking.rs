@@ -2,11 +2,14 @@
 //!
 //! As in El-Sana & Chiang (2000), section 3.2, every subtree of `L` levels is a block, from the roots down. Trees of
 //! real meshes are ragged, and most blocks are small fragments at their lower ends. So blocks that hang below the same
-//! page go into one page while they fit; the roots of the trees hang
-//! below nothing and are packed likewise. Such a page takes the part of the paper's meta-node: it is what is read, kept
-//! in a place holder and counted.
+//! page go into one page while they fit; the roots of the trees hang below nothing and are packed likewise. Where room is
+//! left after that, blocks are continued downwards: the blocks below those of the page are joined to them, as long as they
+//! fit, those of the largest error first, since they are needed first. Such a page takes the part of the paper's meta-node:
+//! it is what is read, kept in a place holder and counted.
 //!
 //! The pages below a page have consecutive numbers, and larger ones than it; root pages come first.
+
+use std::collections::BinaryHeap;
 
 use vertex_tree::{NONE, NodeId};
 
@@ -33,8 +36,10 @@ pub(crate) struct Blocking {
     pub blocks: Vec<u32>,
     pub pages: Vec<PageNodes>,
     pub root_pages: u32,
-    /// The number of each node of the log.
+    /// The number of each node in the file.
     pub number: Vec<NodeId>,
+    /// The topmost nodes of blocks that have been joined to the block above.
+    joined: Vec<bool>,
 }
 
 /// What a block asks of a page.
@@ -50,19 +55,24 @@ impl Size {
     }
 }
 
-/// The nodes of a block in preorder, and the topmost nodes of the blocks below it in order.
-pub(crate) fn walk(
+/// The nodes of a block in preorder, and the topmost nodes of the blocks below it in order. A block that is joined to the
+/// one above counts as a part of it.
+fn walk_block(
     arrangement: &Arrangement,
     top: u32,
     levels: u32,
+    is_joined: impl Fn(u32) -> bool,
     mut node: impl FnMut(u32),
     mut below: impl FnMut(u32),
 ) {
     let mut stack = vec![(top, 0)];
-    while let Some((n, depth)) = stack.pop() {
+    while let Some((n, mut depth)) = stack.pop() {
         if depth == levels {
-            below(n);
-            continue;
+            if !is_joined(n) {
+                below(n);
+                continue;
+            }
+            depth = 0;
         }
         node(n);
         let [kept, removed] = arrangement.children(n);
@@ -74,9 +84,9 @@ fn size(arrangement: &Arrangement, top: u32, levels: u32) -> Size {
     let (mut nodes, mut links, mut triangles) = (0, 0, 0);
     let count = |n: u32| {
         nodes += 1;
-        triangles += arrangement.brought(n).len();
+        triangles += arrangement.node(n).brought.len();
     };
-    walk(arrangement, top, levels, count, |_| links += 1);
+    walk_block(arrangement, top, levels, |_| false, count, |_| links += 1);
     Size { nodes, words: page::block_words(nodes, links, triangles) }
 }
 
@@ -88,7 +98,7 @@ fn largest(arrangement: &Arrangement, levels: u32) -> Size {
         let size = size(arrangement, top, levels);
         largest.nodes = largest.nodes.max(size.nodes);
         largest.words = largest.words.max(size.words);
-        walk(arrangement, top, levels, |_| (), |below| tops.push(below));
+        walk_block(arrangement, top, levels, |_| false, |_| (), |below| tops.push(below));
     }
     largest
 }
@@ -113,7 +123,8 @@ impl Blocking {
             blocks: Vec::new(),
             pages: Vec::new(),
             root_pages: 0,
-            number: vec![NodeId(NONE); arrangement.spans.len()],
+            number: vec![NodeId(NONE); arrangement.nodes as usize],
+            joined: vec![false; arrangement.nodes as usize],
         };
         let room = Size { nodes: 1 << slot_bits, words: page_bytes as usize / 4 };
         blocking.pack(arrangement, &arrangement.roots, NONE, room);
@@ -125,12 +136,14 @@ impl Blocking {
             below.clear();
             let mut slot = 0;
             for at in blocking.pages[page as usize].blocks.clone() {
-                let (number, top) = (&mut blocking.number, blocking.blocks[at]);
+                let (number, joined) = (&mut blocking.number, &blocking.joined);
                 let give = |n: u32| {
                     number[n as usize] = NodeId(page << slot_bits | slot);
                     slot += 1;
                 };
-                walk(arrangement, top, levels, give, |top| below.push(top));
+                let is_joined = |n: u32| joined[n as usize];
+                let top = blocking.blocks[at];
+                walk_block(arrangement, top, levels, is_joined, give, |top| below.push(top));
             }
             let first = blocking.pages.len() as u32;
             blocking.pack(arrangement, &below, page, room);
@@ -139,6 +152,11 @@ impl Blocking {
             blocking.pages[page as usize].children = children;
         }
         blocking
+    }
+
+    /// The nodes of a block, with what has been joined to it, in preorder.
+    pub fn walk(&self, arrangement: &Arrangement, top: u32, node: impl FnMut(u32)) {
+        walk_block(arrangement, top, self.levels, |n| self.joined[n as usize], node, |_| ());
     }
 
     /// Makes pages of blocks, given by their topmost nodes: each goes to the first page, of those begun here, that has room
@@ -162,13 +180,38 @@ impl Blocking {
                 None => begun.push((size, vec![top])),
             }
         }
-        for (_, blocks) in begun {
+        for (used, blocks) in begun {
+            self.join(arrangement, used, &blocks, room);
             let start = self.blocks.len();
             self.blocks.extend(blocks);
             self.pages.push(PageNodes { blocks: start..self.blocks.len(), parent, children: 0..0 });
         }
     }
+
+    /// Joins what is below some blocks to them while there is room on their page.
+    fn join(&mut self, arrangement: &Arrangement, mut used: Size, tops: &[u32], room: Size) {
+        // What is not negative is in the order of its bits.
+        let key = |top: u32| (arrangement.node(top).bounds.eps.to_bits(), top);
+        let mut below = BinaryHeap::new();
+        let add = |below: &mut BinaryHeap<(u32, u32)>, top: u32| {
+            walk_block(arrangement, top, self.levels, |_| false, |_| (), |top| below.push(key(top)));
+        };
+        tops.iter().for_each(|&top| add(&mut below, top));
+        // However many blocks there are below: a page takes a few, and building stays linear.
+        let mut tried = 0;
+        while let Some((_, top)) = below.pop().filter(|_| tried < TRIED) {
+            let size = size(arrangement, top, self.levels);
+            let both = used.and(Size { words: size.words.saturating_sub(page::JOINED_WORDS), ..size });
+            if both.nodes <= room.nodes && both.words + page::HEADER_WORDS <= room.words {
+                used = both;
+                self.joined[top as usize] = true;
+                add(&mut below, top);
+            } else {
+                tried += 1;
+            }
+        }
+    }
 }
 
-/// Pages that are tried for a block before another is begun.
+/// Pages that are tried for a block before another is begun, and blocks that are tried for a page before it is full.
 const TRIED: usize = 8;

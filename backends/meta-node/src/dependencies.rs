@@ -21,11 +21,14 @@
 //! of what is wanted under "`p` needs the parents of `N(p)`", whatever the order; and since what is needed has a
 //! larger number, it ends. A collapse that the second rule forbids is still needed by a neighbour that is finer.
 //!
-//! One thing is open. Where a chain of needed nodes is broken off for want of a page, those at its end that have been
-//! unfolded are needed by nothing that is active yet, and fold in the next frame. With place holders for a few pages only,
-//! chains that are longer than what fits may then never be completed; with memory for what the front touches they are.
+//! A chain of needed nodes may be broken off for want of a page. Those at its end that have been unfolded by then are
+//! needed by nothing that is active yet. If they folded again, and memory held only a few pages, a chain that is longer
+//! than what fits would never be completed. So a node that has been unfolded for another is held for as long as that one,
+//! or one for which that one has been named in its turn, is refused, by the rule or for want of its page: until it has
+//! been split, and the second rule holds the node, or until a frame has passed in which it has not been asked for. Then
+//! every page that comes takes a chain further, and nothing takes it back.
 
-use rustc_hash::FxHashMap;
+use rustc_hash::{FxHashMap, FxHashSet};
 use vertex_tree::{NONE, NodeId, StarMesh, Step, VertexId};
 
 /// What is done about neighbours that are too coarse or too fine for a change.
@@ -62,6 +65,8 @@ struct InPlay {
     collapse: u32,
     /// Where its vertex is shown.
     leaf: u32,
+    /// Where the other one is, that its split has brought; [`NONE`] before that.
+    removed: u32,
 }
 
 /// One of the two vertices of a split: its node and that node's number in the log, or nothing for a leaf.
@@ -76,6 +81,15 @@ pub(crate) struct Rules {
     shown: Vec<Shown>,
     /// The nodes in play: what is needed, or what needs it, may be on a page that is not there.
     in_play: FxHashMap<NodeId, InPlay>,
+    /// Of nodes that have been named as needed: for which node.
+    held: FxHashMap<NodeId, NodeId>,
+    /// Nodes that have been refused as they need another, and the last frame in which that was so.
+    refused: FxHashMap<NodeId, u64>,
+    frame: u64,
+    /// Whether this frame has come to unfolding: then what is refused in it is known, at least for what follows.
+    unfolds: bool,
+    /// Nodes that were to fold in this frame and have been held.
+    were_held: FxHashSet<NodeId>,
 }
 
 impl Rules {
@@ -86,7 +100,24 @@ impl Rules {
             leaves,
             shown: Vec::new(),
             in_play: FxHashMap::default(),
+            held: FxHashMap::default(),
+            refused: FxHashMap::default(),
+            frame: 0,
+            unfolds: false,
+            were_held: FxHashSet::default(),
         })
+    }
+
+    /// A frame starts: what has not been asked for in the one before is not waited for any more.
+    pub fn begin_frame(&mut self) {
+        let last = self.frame;
+        self.frame += 1;
+        self.refused.retain(|_, frame| *frame == last);
+        if self.refused.is_empty() {
+            self.held.clear();
+        }
+        self.were_held.clear();
+        self.unfolds = false;
     }
 
     fn number(&self, collapse: u32) -> u32 {
@@ -97,7 +128,7 @@ impl Rules {
     pub fn enter(&mut self, half: Half, leaf: u32, above: Option<NodeId>) {
         if let Some((node, collapse)) = half {
             let above = above.unwrap_or(NodeId(NONE));
-            self.in_play.insert(node, InPlay { above, collapse, leaf });
+            self.in_play.insert(node, InPlay { above, collapse, leaf, removed: NONE });
         }
     }
 
@@ -128,19 +159,57 @@ impl Rules {
 
     /// What keeps a boundary node from splitting, if anything does. It is known without the node's page: a chain of nodes
     /// that need each other unfolds with a page at a time.
-    pub fn may_split(&self, node: NodeId, mesh: &StarMesh) -> Option<Step> {
+    pub fn may_split(&mut self, node: NodeId, mesh: &StarMesh) -> Option<Step> {
+        self.unfolds = true;
         let &InPlay { collapse, leaf, .. } = self.in_play.get(&node)?;
         let around = mesh.neighbours(mesh.vertex(leaf)).map(|vertex| self.shown[vertex as usize]);
         let largest = around.max_by_key(|shown| shown.number)?;
         if largest.number < self.number(collapse) {
+            // Its page may still be missing.
+            if let Some(frame) = self.refused.get_mut(&node) {
+                *frame = self.frame;
+            }
             return None;
         }
-        Some(if self.forces { Step::Needs(largest.node) } else { Step::Blocked })
+        if !self.forces {
+            return Some(Step::Blocked);
+        }
+        self.refused.insert(node, self.frame);
+        self.held.insert(largest.node, node);
+        Some(Step::Needs(largest.node))
     }
 
-    /// What keeps a node, whose children are shown at two leaves, from being collapsed, if anything does.
-    pub fn may_merge(&self, collapse: u32, leaves: [u32; 2], mesh: &StarMesh) -> Option<Step> {
-        let halves = leaves.map(|leaf| mesh.vertex(leaf));
+    /// A node has been split, and a vertex is shown at another leaf: it waits for nothing any more.
+    pub fn split(&mut self, node: NodeId, removed: u32) {
+        self.refused.remove(&node);
+        if let Some(node) = self.in_play.get_mut(&node) {
+            node.removed = removed;
+        }
+    }
+
+    /// Whether a node that is to fold has been unfolded for another that still waits. At first in a frame, before anything
+    /// unfolds, that is one that was refused in the frame before; when the node is asked again, in this one.
+    fn is_held(&mut self, node: NodeId) -> bool {
+        let since = if self.unfolds || self.were_held.contains(&node) { self.frame } else { self.frame - 1 };
+        // Each has a larger number than the one that it was named for, so this ends.
+        let for_which = |node: &NodeId| self.held.get(node).copied();
+        let is_refused = |node: NodeId| self.refused.get(&node).is_some_and(|&frame| frame >= since);
+        let is_held = std::iter::successors(for_which(&node), for_which).any(is_refused);
+        if is_held {
+            self.were_held.insert(node);
+        }
+        is_held
+    }
+
+    /// What keeps the children of an active node from being collapsed, if anything does. This too is known without its page:
+    /// what is still needed asks for none.
+    pub fn may_merge(&mut self, node: NodeId, mesh: &StarMesh) -> Option<Step> {
+        if self.is_held(node) {
+            return Some(Step::StillNeeded);
+        }
+        let &InPlay { collapse, leaf, removed, .. } =
+            self.in_play.get(&node).filter(|n| n.removed != NONE)?;
+        let halves = [leaf, removed].map(|leaf| mesh.vertex(leaf));
         let around = halves.into_iter().flat_map(|half| mesh.neighbours(half));
         let others = around.filter(|vertex| !halves.contains(vertex));
         let smallest = others.map(|vertex| self.shown[vertex as usize].parent).min()?;

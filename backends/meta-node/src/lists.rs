@@ -1,38 +1,47 @@
-//! Place holders in order: each is in one of three lists or in none.
+//! Place holders in order: each is in one of four lists or in none.
 
 use vertex_tree::NONE;
 
 /// What a place holder is to the navigation.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum Class {
-    /// Empty, or its page is neither in use nor referred to: the free list, first in, first out. The page stays where it
+    /// Its page is neither in use nor referred to: the free list, first in, first out. The page stays where it
     /// is until its place is taken: its second chance.
     Free,
     /// Some page in use refers to its page.
     Prefetched,
     /// Nodes of the front are on its page.
     InUse,
+    /// A change on its page is foreseen.
+    Foreseen,
 }
 
-/// In no list: on its way, never evicted, or given back.
-const OUTSIDE: u8 = 3;
+impl Class {
+    /// Those of least use first.
+    pub const ALL: [Self; KINDS] = [Self::Free, Self::Prefetched, Self::InUse, Self::Foreseen];
+}
+
+const KINDS: usize = 4;
+
+/// In no list: on its way, never evicted, or empty.
+const OUTSIDE: u8 = KINDS as u8;
 
 /// Doubly linked lists through arrays: every move is O(1) and none allocates.
 #[derive(Debug)]
 pub(crate) struct Lists {
-    /// Neighbours of each place holder, and last those of the heads of the three lists.
+    /// Neighbours of each place holder, and last those of the heads of the lists.
     before: Vec<u32>,
     after: Vec<u32>,
     class: Vec<u8>,
-    len: [u32; 3],
+    len: [u32; KINDS],
     holders: usize,
 }
 
 impl Lists {
     pub fn new(holders: usize) -> Self {
-        let heads = (0..3).map(|head| (holders + head) as u32);
+        let heads = (0..KINDS).map(|head| (holders + head) as u32);
         let links: Vec<u32> = std::iter::repeat_n(NONE, holders).chain(heads).collect();
-        Self { before: links.clone(), after: links, class: vec![OUTSIDE; holders], len: [0; 3], holders }
+        Self { before: links.clone(), after: links, class: vec![OUTSIDE; holders], len: [0; KINDS], holders }
     }
 
     pub fn len(&self, class: Class) -> u32 {
@@ -40,13 +49,19 @@ impl Lists {
     }
 
     pub fn class(&self, holder: u32) -> Option<Class> {
-        [Class::Free, Class::Prefetched, Class::InUse].get(usize::from(self.class[holder as usize])).copied()
+        Class::ALL.get(usize::from(self.class[holder as usize])).copied()
     }
 
     /// The holder that has been in a list for longest.
     pub fn front(&self, class: Class) -> Option<u32> {
         let front = self.after[self.holders + class as usize];
         ((front as usize) < self.holders).then_some(front)
+    }
+
+    /// The holders in a list, in order.
+    pub fn iter(&self, class: Class) -> impl Iterator<Item = u32> + '_ {
+        let next = |&holder: &u32| Some(self.after[holder as usize]).filter(|&h| (h as usize) < self.holders);
+        std::iter::successors(self.front(class), next)
     }
 
     pub fn remove(&mut self, holder: u32) {
@@ -85,6 +100,8 @@ mod tests {
         (0..4).for_each(|h| lists.push(h, Class::Free));
         lists.push(0, Class::Free);
         lists.push(2, Class::InUse);
+        assert_eq!(lists.iter(Class::Free).collect::<Vec<_>>(), [1, 3, 0]);
+        assert_eq!(lists.iter(Class::Foreseen).next(), None);
         let mut order = Vec::new();
         while let Some(h) = lists.front(Class::Free) {
             assert_eq!(lists.class(h), Some(Class::Free));

@@ -13,7 +13,7 @@
 //!    6    T, triangles
 //!    7    first page below
 //!    8    how many pages are below; their numbers follow each other
-//!    9    14 N  nodes, by slot: each block in preorder
+//!    9    14 N  nodes, by slot: each block in preorder, with the blocks that are joined to it
 //!         2 B   blocks: number of the node above the topmost one, and that node's number in the log; both
 //!               2^32 - 1 for a root
 //!         7 K   links: number of the node, its number in the log, centre, radius, error
@@ -86,6 +86,9 @@ pub(crate) fn block_words(nodes: usize, links: usize, triangles: usize) -> usize
     NODE_WORDS * nodes + BLOCK_WORDS + LINK_WORDS * links + TRIANGLE_WORDS * triangles
 }
 
+/// Words that are saved where a block is joined to the one above: its link, and its place among the blocks.
+pub(crate) const JOINED_WORDS: usize = BLOCK_WORDS + LINK_WORDS;
+
 /// Where the parts of a page are.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub(crate) struct Layout {
@@ -144,6 +147,15 @@ impl<'a> Page<'a> {
             };
             prefetch(self.words, at);
             prefetch(self.words, at + words - 1);
+        }
+    }
+
+    /// Starts to read the triangles that the node in a slot brings.
+    #[inline(always)]
+    pub fn prefetch_brought(self, slot: u32) {
+        if slot < self.layout.nodes {
+            let (start, _) = self.brought_range(slot);
+            prefetch(self.words, self.layout.triangles_at as usize + TRIANGLE_WORDS * start as usize);
         }
     }
 

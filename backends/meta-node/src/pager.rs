@@ -1,17 +1,22 @@
 //! Main-memory buffer management: El-Sana & Chiang (2000), section 3.3.3, and the urgent requests of section 3.3.2.
 //!
-//! There are K place holders, each as large as the largest page. A table says for each page where it is, if it is
-//! anywhere: the paper's hash table, whose hash function is the identity here. A page has two counts, kept whether it is
-//! in memory or not: its *usage count*, the nodes and leaves of the front on it, and its *reference count*, how many of
-//! the pages above and below it are in use. A page whose counts are both 0 is flushed: its place holder joins the free
-//! list at the end, and keeps the page until the place is taken, first in, first out (its *second chance*). A count that
-//! rises above 0 asks for the page; where no place is free, that is given up for now, and tried again when one is.
+//! A page in memory lies in a place holder. A table says for each page where it is, if it is anywhere: the paper's hash
+//! table, whose hash function is the identity here. A page has two counts, kept whether it is in memory or not: its *usage
+//! count*, the nodes and leaves of the front on it, and its *reference count*, how many of the pages above and below it are
+//! in use. A page whose counts are both 0 is flushed: its place holder joins the free list at the end, and keeps the page
+//! until the room is needed, first in, first out (its *second chance*). A count that rises above 0 asks for the page; where
+//! there is no room, that is given up for now, and tried again when there is.
 //!
-//! A page that is missing at a change is asked for *urgently*: a place is taken from the free list, or from a page that is
+//! A page that is missing at a change is asked for *urgently*: room is made by those of the free list, or by a page that is
 //! only referred to. Switching down is allowed that only while three place holders are not in use, so that switching
 //! up always finds one; those on their way are reserved and do not count.
 //!
 //! # Beyond the paper
+//!
+//! The paper has K place holders of the size of the largest page, since pages do not differ much. Ours are filled to 70 %
+//! on average, so that memory for a quarter of the file would hold 17 % of the pages. Here a place holder is as large as
+//! its page; what is limited is the sum, which counts what is on its way too. Where the paper counts free place holders,
+//! room for so many of the largest is meant.
 //!
 //! The paper's navigation reads the nodes of the front in every frame, so that their pages must stay. Ours does not: the
 //! engine keeps sphere and error of the front itself, and a page is touched only by a change. So with
@@ -27,22 +32,29 @@
 //! A node can unfold before the page of its children is there, since links carry their spheres; so what is asked for is
 //! not only what the front has come to, but also the pages to which the next levels below it lead.
 
+mod arrivals;
 mod counts;
+mod foresight;
+mod memory;
 mod requests;
 
 use std::collections::VecDeque;
 use std::sync::Arc;
+use std::time::Duration;
 
 use rustc_hash::FxHashMap;
-use vertex_tree::{NONE, PageStats, prefetch};
+use vertex_tree::{NONE, PageStats, Prefetch, prefetch};
 
-use crate::board::{Board, Command, Done};
+use self::foresight::Foresight;
 use crate::error::MetaNodeError;
 use crate::file::MetaNodeFile;
-use crate::lists::{Class, Lists};
+use crate::lists::Lists;
 use crate::page::{Layout, Page};
+use crate::settings::{InUse, Settings};
+use crate::store::Store;
+use crate::waiting::{Command, Done};
 
-/// The least number of place holders: one in use and three that are not.
+/// The least number of place holders of the largest size: one in use and three that are not.
 pub(crate) const LEAST_HOLDERS: u32 = 4;
 
 /// Frames without a touch after which a page may make room for one that is only likely to be needed: a minute. What has
@@ -63,16 +75,6 @@ const MOST_GIVEN_UP: usize = 4096;
 /// In the table: the page is on its way.
 const PENDING: u32 = 1 << 31;
 
-/// What happens to pages with nodes of the front where there is no other place.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub enum InUse {
-    /// The one that has not been touched for longest makes room. Every cut can be reached.
-    #[default]
-    Yields,
-    /// They stay, as in the paper, but for switching up and for less memory. A cut that needs more is not reached.
-    Stays,
-}
-
 /// Which way a change goes that finds its page missing.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum Switch {
@@ -80,10 +82,11 @@ pub(crate) enum Switch {
     Up,
 }
 
-/// A place for a page.
+/// A place for a page, and all that is asked of it at a change: a cache line.
 #[derive(Debug, Default)]
+#[repr(align(64))]
 struct Holder {
-    /// Empty until it is used for the first time, and while it travels with a command.
+    /// As large as the page; empty without one, and while it travels with a command.
     words: Box<[u32]>,
     /// [`NONE`] while it holds none and waits for none.
     page: u32,
@@ -92,6 +95,10 @@ struct Holder {
     touched: u64,
     /// Whether the pages around are counting this one as in use.
     counted: bool,
+    /// While the page is on its way: whether a change has been refused for want of it.
+    demanded: bool,
+    /// The page was fetched ahead, and no change has used it yet.
+    ahead: bool,
 }
 
 /// A page that could not be read.
@@ -104,8 +111,10 @@ struct Failure {
 
 pub(crate) struct Pager {
     pub file: Arc<MetaNodeFile>,
-    board: Arc<Board>,
+    store: Store,
     in_use: InUse,
+    how: Prefetch,
+    foresight: Foresight,
     frame: u64,
     /// For each page: its place holder, with [`PENDING`] while it is on its way; [`NONE`] if it is nowhere.
     table: Vec<u32>,
@@ -113,16 +122,16 @@ pub(crate) struct Pager {
     references: Vec<u16>,
     holders: Vec<Holder>,
     lists: Lists,
-    /// K, and how many place holders there are.
-    allowed: u32,
-    live: u32,
+    /// Words that place holders may take, those that they do, and of these those that are on their way.
+    allowed: u64,
+    taken: u64,
+    under_way: u64,
     /// Place holders that are there only in name.
-    retired: Vec<u32>,
+    empty: Vec<u32>,
     /// Pages below this number are never evicted.
     kept: u32,
-    /// Place holders with a page, and those on their way.
+    /// Place holders with a page.
     resident: u32,
-    pending: u32,
     /// A place holder whose page is asking for those around it: it does not make room for them.
     guarded: u32,
     given_up: VecDeque<u32>,
@@ -136,33 +145,27 @@ pub(crate) struct Pager {
     last_fault: Option<MetaNodeError>,
 }
 
-impl Drop for Pager {
-    /// The thread ends after the read that it is at. Nobody waits for that.
-    fn drop(&mut self) {
-        self.board.stop();
-    }
-}
-
 impl Pager {
-    /// Starts the I/O thread.
-    pub fn new(file: Arc<MetaNodeFile>, page_memory: u64, in_use: InUse) -> Result<Self, MetaNodeError> {
+    /// Starts the I/O thread, where there is to be one.
+    pub fn new(file: Arc<MetaNodeFile>, settings: &Settings) -> Result<Self, MetaNodeError> {
         let pages = file.header.pages as usize;
-        let board = Arc::new(Board::default());
         let mut pager = Self {
-            board: board.clone(),
-            in_use,
+            store: Store::new(&file, settings.io)?,
+            in_use: settings.in_use,
+            how: settings.prefetch,
+            foresight: Foresight::new(if settings.prefetch == Prefetch::Schedule { pages } else { 0 }),
             frame: 1,
             table: vec![NONE; pages],
             usage: vec![0; pages],
             references: vec![0; pages],
             holders: Vec::new(),
-            lists: Lists::new(pages + LEAST_HOLDERS as usize),
+            lists: Lists::new(pages),
             allowed: 0,
-            live: 0,
-            retired: Vec::new(),
+            taken: 0,
+            under_way: 0,
+            empty: Vec::new(),
             kept: 0,
             resident: 0,
-            pending: 0,
             guarded: NONE,
             given_up: VecDeque::new(),
             failures: FxHashMap::default(),
@@ -174,87 +177,8 @@ impl Pager {
             last_fault: None,
             file,
         };
-        pager.set_page_memory(page_memory)?;
-        let file = pager.file.clone();
-        let read = move |page, words: &mut [u32]| {
-            // A store is other people's code: a panic there is a fault like any other.
-            let read = std::panic::AssertUnwindSafe(|| file.read_page(page, words));
-            std::panic::catch_unwind(read).unwrap_or_else(|_| {
-                Err(MetaNodeError::Page {
-                    file: file.name().to_owned(),
-                    page,
-                    offset: file.page_offset(page),
-                    reason: "the store panicked",
-                })
-            })
-        };
-        std::thread::Builder::new()
-            .name("meta-node I/O".to_owned())
-            .spawn(move || board.serve(read))
-            .map_err(MetaNodeError::Thread)?;
+        pager.set_page_memory(settings.page_memory)?;
         Ok(pager)
-    }
-
-    /// Sets how much memory the place holders may take. Less than now takes effect at once.
-    pub fn set_page_memory(&mut self, bytes: u64) -> Result<(), MetaNodeError> {
-        let each = self.file.holder_bytes();
-        // With every page in use, three more are what the three-free rule asks for. Their memory is never taken.
-        let most = self.file.header.pages.saturating_add(LEAST_HOLDERS);
-        let allowed = u32::try_from(bytes / each).unwrap_or(u32::MAX).min(most);
-        if allowed < LEAST_HOLDERS {
-            let least = each * u64::from(LEAST_HOLDERS);
-            return Err(MetaNodeError::Memory { given: bytes, least, holders: LEAST_HOLDERS });
-        }
-        if self.is_complete() && allowed < self.file.header.pages {
-            self.recount();
-        }
-        self.allowed = allowed;
-        // Roots stay, unless a forest of thousands of trees would leave no room for anything else.
-        let roots = self.file.header.root_pages;
-        let kept = if roots <= allowed / 2 { roots } else { 0 };
-        let before = std::mem::replace(&mut self.kept, kept);
-        for page in 0..before.max(kept) {
-            self.classify(page);
-        }
-        while self.live < allowed {
-            let holder = self.retired.pop().unwrap_or_else(|| {
-                self.holders.push(Holder { page: NONE, ..Holder::default() });
-                self.holders.len() as u32 - 1
-            });
-            self.lists.push(holder, Class::Free);
-            self.live += 1;
-        }
-        self.shrink();
-        Ok(())
-    }
-
-    /// Gives place holders up until there are no more than allowed.
-    fn shrink(&mut self) {
-        while self.live > self.allowed {
-            let lists = &self.lists;
-            let victim =
-                [Class::Free, Class::Prefetched, Class::InUse].into_iter().find_map(|c| lists.front(c));
-            let holder = match victim {
-                Some(holder) => {
-                    self.evict(holder);
-                    holder
-                }
-                None => match self.withdraw(true) {
-                    Some(holder) => holder,
-                    // What has come meanwhile can go too. Then one at most is being read, and with the roots that are
-                    // kept that is no more than is allowed.
-                    None if self.take_arrivals() => {
-                        self.arrived_between = true;
-                        continue;
-                    }
-                    None => return,
-                },
-            };
-            self.lists.remove(holder);
-            self.holders[holder as usize].words = Box::default();
-            self.retired.push(holder);
-            self.live -= 1;
-        }
     }
 
     /// Where a page is, if it is in memory.
@@ -282,98 +206,45 @@ impl Pager {
         prefetch(&self.holders, holder as usize);
     }
 
-    /// Drops the page from a place holder.
+    /// Drops a page from memory.
     fn evict(&mut self, holder: u32) {
-        let page = std::mem::replace(&mut self.holders[holder as usize].page, NONE);
-        if page != NONE {
-            self.count_around(holder, false);
-            self.table[page as usize] = NONE;
-            self.resident -= 1;
-        }
-    }
-
-    /// Starts a frame: takes what has arrived. Says whether anything has since the frame before.
-    pub fn begin_frame(&mut self) -> bool {
-        self.frame += 1;
-        let since = std::mem::take(&mut self.arrived_between);
-        let now = self.take_arrivals();
-        self.shrink();
-        since || now
-    }
-
-    /// Takes what has arrived, and says whether anything has.
-    fn take_arrivals(&mut self) -> bool {
-        let mut done = std::mem::take(&mut self.done);
-        self.board.collect(&mut done);
-        let any = !done.is_empty();
-        for Done { command, result } in done.drain(..) {
-            match result {
-                Ok(layout) => self.arrive(command, layout),
-                Err(fault) => self.fail(command, fault),
-            }
-        }
-        self.done = done;
-        any
-    }
-
-    fn arrive(&mut self, command: Command, layout: Layout) {
-        let Command { page, holder, words, urgent } = command;
-        self.failures.remove(&page);
-        self.stats.reads += 1;
-        self.stats.read_bytes += 4 * self.file.page_words(page) as u64;
-        self.table[page as usize] = holder;
-        self.pending -= 1;
-        self.resident += 1;
-        let touched = if urgent { self.frame } else { 0 };
-        self.holders[holder as usize] = Holder { words, page, layout, touched, counted: false };
-        self.classify(page);
-        if self.usage[page as usize] > 0 {
-            self.count_around(holder, true);
-        }
-    }
-
-    fn fail(&mut self, command: Command, fault: MetaNodeError) {
-        let Command { page, holder, words, .. } = command;
-        self.stats.faults += 1;
-        self.last_fault = Some(fault);
-        self.table[page as usize] = NONE;
-        self.pending -= 1;
+        self.count_around(holder, false);
+        self.lists.remove(holder);
         let slot = &mut self.holders[holder as usize];
-        slot.words = words;
-        slot.page = NONE;
-        slot.touched = 0;
-        self.lists.push(holder, Class::Free);
-        // Asked for again, but not in every frame forever.
-        let failure = self.failures.entry(page).or_default();
-        failure.until = self.frame + (1 << failure.times.min(63)).min(LONGEST_REST) - 1;
-        failure.times += 1;
-        self.give_up(page);
+        self.table[slot.page as usize] = NONE;
+        self.taken -= slot.words.len() as u64;
+        (slot.page, slot.words) = (NONE, Box::default());
+        self.resident -= 1;
+        self.empty.push(holder);
     }
 
-    /// Ends a frame: tries again what was given up, and posts all commands.
+    /// Ends a frame: asks for what is likely to be needed, and posts all commands.
     pub fn end_frame(&mut self) -> PageStats {
-        for _ in 0..self.given_up.len() {
-            if self.takeable(Class::Free, self.frame).is_none() {
-                break;
-            }
-            let Some(page) = self.given_up.pop_front() else { break };
-            if self.usage[page as usize] > 0 || self.references[page as usize] > 0 {
-                self.prefetch(page);
-            }
+        match self.how {
+            Prefetch::Paper => self.try_again(),
+            Prefetch::Schedule => self.plan(),
+            Prefetch::None => {}
         }
         self.post();
-        self.stats.resident_bytes = u64::from(self.resident + self.pending) * self.file.holder_bytes();
+        self.stats.resident_bytes = 4 * self.taken;
         std::mem::take(&mut self.stats)
     }
 
     fn post(&mut self) {
-        self.board.post(&mut self.outbox, &mut self.promoted);
+        if !self.outbox.is_empty() || !self.promoted.is_empty() {
+            self.store.post(&mut self.outbox, &mut self.promoted);
+        }
     }
 
     /// Waits until everything that has been asked for is there, or has failed.
     pub fn settle(&mut self) {
         self.post();
-        self.board.settle();
+        self.store.settle();
+    }
+
+    /// Lets time pass on a store that has its own.
+    pub fn pass(&mut self, time: Duration) {
+        self.store.pass(time);
     }
 
     pub fn last_fault(&self) -> Option<&MetaNodeError> {

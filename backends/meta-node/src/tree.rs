@@ -1,38 +1,22 @@
 //! The tree that the engine unfolds and folds.
 
 use std::sync::Arc;
+use std::time::Duration;
 
 use rustc_hash::FxHashSet;
 use vertex_tree::{Bounds, LeafTriangle, MeshSink, NodeId, PageStats, StarMesh, Step, TreeError, VertexTree};
 
-use crate::dependencies::{Dependencies, Half, Rules};
+use crate::dependencies::{Half, Rules};
 use crate::error::MetaNodeError;
 use crate::file::MetaNodeFile;
 use crate::page::{Child, Node, Page};
-use crate::pager::{InUse, Pager, Switch};
-
-/// How a tree pages and what it makes of dependencies.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct Settings {
-    /// Bytes that place holders may take, at most. Tables of about 8 bytes a page come on top.
-    pub page_memory: u64,
-    /// What is done about neighbours that are too coarse or too fine for a change.
-    pub dependencies: Dependencies,
-    /// What happens to pages with nodes of the front where there is no other place.
-    pub in_use: InUse,
-}
-
-impl Default for Settings {
-    /// Memory for everything, dependencies off, pages yield.
-    fn default() -> Self {
-        Self { page_memory: u64::MAX, dependencies: Dependencies::Off, in_use: InUse::Yields }
-    }
-}
+use crate::pager::{Pager, Switch};
+use crate::settings::Settings;
 
 /// A file of meta-nodes, and the state of one front through it.
 ///
 /// Everything here runs on the caller's thread, and place holders belong to it; one more thread reads pages (see
-/// `board.rs`). It starts with the tree and ends after it.
+/// `board.rs`). It starts with the tree and ends after it. With [`Io::Simulated`](crate::Io::Simulated) there is none.
 pub struct MetaNodeTree {
     pager: Pager,
     roots: Vec<NodeId>,
@@ -48,7 +32,7 @@ pub struct MetaNodeTree {
 }
 
 impl MetaNodeTree {
-    /// A tree with every node folded. The root pages have been asked for.
+    /// A tree with every node folded. With the paper's prefetching the root pages have been asked for.
     ///
     /// # Errors
     /// [`MetaNodeError::Memory`], [`MetaNodeError::Thread`].
@@ -56,7 +40,7 @@ impl MetaNodeTree {
         let (slot_bits, leaves) = (file.header.slot_bits, file.header.leaves);
         let roots = file.roots.iter().map(|root| root.node).collect();
         let mut tree = Self {
-            pager: Pager::new(file, settings.page_memory, settings.in_use)?,
+            pager: Pager::new(file, &settings)?,
             roots,
             slot_bits,
             mesh: None,
@@ -87,7 +71,7 @@ impl MetaNodeTree {
         self.pager.set_page_memory(bytes)
     }
 
-    /// Asks for every page for which there is a free place. Once these have [come](VertexTree::settle), a tree with memory
+    /// Asks for every page for which there is room. Once these have [come](VertexTree::settle), a tree with memory
     /// for everything misses nothing.
     pub fn load_all(&mut self) {
         self.pager.load_all();
@@ -272,7 +256,7 @@ impl VertexTree for MetaNodeTree {
     }
 
     fn unfold<M: MeshSink>(&mut self, node: NodeId, mesh: &mut M) -> Result<Step, TreeError> {
-        if let (Some(rules), Some(stars)) = (&self.rules, &self.mesh)
+        if let (Some(rules), Some(stars)) = (&mut self.rules, &self.mesh)
             && let Some(step) = rules.may_split(node, stars)
         {
             return Ok(step);
@@ -293,6 +277,7 @@ impl VertexTree for MetaNodeTree {
         }
         self.displayed += u64::from(end - start);
         if let (Some(rules), Some(stars)) = (&mut self.rules, &self.mesh) {
+            rules.split(node, leaves[1]);
             for (leaf, half) in leaves.into_iter().zip(halves(node.0 - slot, page, of)) {
                 rules.show(stars.vertex(leaf), leaf, half, Some(of.log_number()));
                 rules.enter(half, leaf, Some(node));
@@ -305,6 +290,11 @@ impl VertexTree for MetaNodeTree {
     }
 
     fn fold<M: MeshSink>(&mut self, node: NodeId, mesh: &mut M) -> Result<Step, TreeError> {
+        if let (Some(rules), Some(stars)) = (&mut self.rules, &self.mesh)
+            && let Some(step) = rules.may_merge(node, stars)
+        {
+            return Ok(step);
+        }
         let Some(holder) = self.find(node, Switch::Up) else { return Ok(Step::NotResident) };
         let (own, slot) = self.place(node);
         let page = self.pager.page(holder);
@@ -315,11 +305,6 @@ impl VertexTree for MetaNodeTree {
         let (children, leaves @ [kept, _], collapse) = (of.children(), of.leaves(), of.log_number());
         let (start, end) = page.brought_range(slot);
         if let Some(stars) = &mut self.mesh {
-            if let Some(rules) = &self.rules
-                && let Some(step) = rules.may_merge(collapse, leaves, stars)
-            {
-                return Ok(step);
-            }
             stars.merge(leaves, mesh);
             if let Some(rules) = &mut self.rules {
                 halves(node.0 - slot, page, of).into_iter().for_each(|half| rules.leave(half));
@@ -355,14 +340,48 @@ impl VertexTree for MetaNodeTree {
                 if let Some(stars) = &self.mesh
                     && slot < page.layout.nodes
                 {
-                    // The triangles that come with a split follow each other in few cache lines.
-                    stars.prepare(page.node(slot).leaves(), &[], step - 3, mesh);
+                    let leaves = page.node(slot).leaves();
+                    if step == 3 {
+                        page.prefetch_brought(slot);
+                        stars.prepare(leaves, &[], 0, mesh);
+                        return;
+                    }
+                    // Most nodes bring two triangles; what there is beyond that is not prepared.
+                    let mut brought = [LeafTriangle::new([0; 3], 0, 0); 2];
+                    let two = brought.iter_mut().zip(page.brought(slot));
+                    let count = two.map(|(place, leaves)| *place = LeafTriangle::new(leaves, 0, 0)).count();
+                    stars.prepare(leaves, &brought[..count], step - 3, mesh);
                 }
             }
         }
     }
 
+    fn look_ahead(&self) -> u32 {
+        self.pager.frames_ahead()
+    }
+
+    fn will_need(&mut self, node: NodeId, frames: u32) {
+        // Unfolding and folding both take the node's own page and no other.
+        self.pager.foresee(self.place(node).0, frames);
+    }
+
+    fn peek(&self, node: NodeId, children: &mut Vec<(NodeId, Bounds)>) -> bool {
+        let is_here = self.is_resident(node);
+        if is_here {
+            children.extend(self.children_and_bounds(node));
+        }
+        is_here
+    }
+
+    fn pass(&mut self, time: Duration) -> Result<(), TreeError> {
+        self.pager.pass(time);
+        Ok(())
+    }
+
     fn begin_frame(&mut self, arrived: &mut Vec<NodeId>) -> Result<(), TreeError> {
+        if let Some(rules) = &mut self.rules {
+            rules.begin_frame();
+        }
         if self.pager.begin_frame() && !self.refused.is_empty() {
             let (pager, bits) = (&self.pager, self.slot_bits);
             let before = arrived.len();

@@ -5,10 +5,10 @@ mod common;
 use std::sync::Arc;
 use std::time::{Duration, Instant};
 
-use common::{Random, bytes, random_log};
+use common::{Front, Random, bytes, frame, holder_bytes, random_log};
 use meta_node::{BuildOptions, InUse, MetaNodeError, MetaNodeFile, MetaNodeTree, Settings};
 use vertex_tree::source::{Faults, Faulty, MemorySource, PageSource, Throttled};
-use vertex_tree::{NodeId, NullSink, Step, VertexTree};
+use vertex_tree::{NullSink, VertexTree};
 
 const PAGES: BuildOptions = BuildOptions { levels: Some(3), page_bytes: 700 };
 
@@ -18,67 +18,6 @@ fn source(side: usize, left: usize) -> MemorySource {
 
 fn file(source: impl PageSource + 'static) -> Arc<MetaNodeFile> {
     Arc::new(MetaNodeFile::open(Arc::new(source)).unwrap())
-}
-
-/// A front, as an engine keeps it: which nodes are active, and which can change.
-struct Front {
-    active: Vec<NodeId>,
-    boundary: Vec<NodeId>,
-}
-
-impl Front {
-    fn new(tree: &MetaNodeTree) -> Self {
-        Self { active: Vec::new(), boundary: tree.roots().to_vec() }
-    }
-
-    /// Tries to unfold every boundary node once. Says how many did, and how many were refused.
-    fn unfold(&mut self, tree: &mut MetaNodeTree) -> (usize, usize) {
-        let (mut done, mut refused) = (0, 0);
-        for node in std::mem::take(&mut self.boundary) {
-            match tree.unfold(node, &mut NullSink).unwrap() {
-                Step::Done => {
-                    done += 1;
-                    self.active.push(node);
-                    self.boundary.extend(tree.children(node));
-                }
-                Step::NotResident => {
-                    refused += 1;
-                    self.boundary.push(node);
-                }
-                step => panic!("{step:?}"),
-            }
-        }
-        (done, refused)
-    }
-
-    /// Tries to fold nodes, the last unfolded first, until one is refused.
-    fn fold(&mut self, tree: &mut MetaNodeTree) -> usize {
-        let mut done = 0;
-        while let Some(&node) = self.active.last() {
-            if tree.fold(node, &mut NullSink).unwrap() != Step::Done {
-                break;
-            }
-            done += 1;
-            self.active.pop();
-            let children: Vec<NodeId> = tree.children(node).collect();
-            self.boundary.retain(|node| !children.contains(node));
-            self.boundary.push(node);
-        }
-        done
-    }
-}
-
-fn frame<R>(
-    tree: &mut MetaNodeTree,
-    change: impl FnOnce(&mut MetaNodeTree) -> R,
-) -> (R, vertex_tree::PageStats) {
-    tree.begin_frame(&mut Vec::new()).unwrap();
-    let changed = change(tree);
-    (changed, tree.end_frame().unwrap())
-}
-
-fn holder_bytes(file: &MetaNodeFile) -> u64 {
-    file.facts().iter().find(|(fact, _)| *fact == "largest page, bytes").unwrap().1.parse().unwrap()
 }
 
 /// With four place holders, a front through all pages is reached all the same, and the way back too.

@@ -2,10 +2,11 @@
 
 mod damage;
 mod driver;
+mod foresight;
 mod meshes;
 mod paging;
 
-use detail_block::{Arrangement, BuildOptions, Loading, Settings};
+use detail_block::{Arrangement, BuildOptions, Io, Settings};
 use driver::{Driver, bytes_of, open};
 use meshes::{Random, grid, random_log, rubble, torus};
 use vertex_tree::{CollapseLog, Mesh, NodeId, VertexTree};
@@ -15,7 +16,7 @@ fn options(levels: u32, quantize: bool, nest_needs: bool) -> BuildOptions {
 }
 
 fn blocking() -> Settings {
-    Settings { loading: Loading::Blocking, grace: 0, ..Settings::default() }
+    Settings { io: Io::Blocking, grace: 0, ..Settings::default() }
 }
 
 /// The mesh of each kind.

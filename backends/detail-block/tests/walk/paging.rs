@@ -3,23 +3,30 @@
 use std::sync::Arc;
 use std::time::Duration;
 
-use detail_block::{ATTEMPTS, Arrangement, BuildOptions, Loading, Settings, XfmFile};
-use vertex_tree::source::{Counted, Faults, Faulty, MemorySource, Throttled};
+use detail_block::{ATTEMPTS, Arrangement, BuildOptions, Io, Settings, XfmFile};
+use vertex_tree::simulated::Simulated;
+use vertex_tree::source::{Faults, Faulty, MemorySource};
 use vertex_tree::{CollapseLog, NodeId, VertexTree};
 
 use crate::driver::{Driver, bytes_of, open};
 use crate::meshes::{Random, random_log, torus};
 use crate::{blocking, options};
 
-fn built(side: usize, options: &BuildOptions) -> (Vec<u8>, CollapseLog) {
+pub fn built(side: usize, options: &BuildOptions) -> (Vec<u8>, CollapseLog) {
     let mut random = Random(11);
     let log = random_log(torus(side, &mut random), &mut random);
     let arrangement = Arrangement::new(&log, options).unwrap();
     (bytes_of(&arrangement), arrangement.effective_log())
 }
 
-fn background(loading: Loading) -> Settings {
-    Settings { loading, grace: 0, ..Settings::default() }
+fn reading(io: Io) -> Settings {
+    Settings { io, grace: 0, ..Settings::default() }
+}
+
+/// What reads: the frame, a thread, and a line on which a read takes one frame of 10 ms in any case.
+fn kinds() -> [Io; 3] {
+    let line = Simulated { bandwidth: Some(10_000_000), ..Simulated::with_latency(Duration::from_millis(8)) };
+    [Io::Blocking, Io::Background, Io::Simulated(line)]
 }
 
 /// One frame of random changes, more down than up or the reverse; `check` sees the driver after every step.
@@ -48,8 +55,8 @@ fn the_hard_quota_is_never_exceeded() {
     let (bytes, log) = built(30, &options(2, false, false));
     let file = open(bytes);
     let all = file.resident_bytes_of_all();
-    for loading in [Loading::Blocking, Loading::OnDemand, Loading::Background] {
-        let mut driver = Driver::new(&file, background(loading));
+    for io in kinds() {
+        let mut driver = Driver::new(&file, reading(io));
         let mut random = Random(17);
         let mut hard = all / 4;
         driver.tree.set_quotas(all / 6, hard);
@@ -63,6 +70,7 @@ fn the_hard_quota_is_never_exceeded() {
                 );
                 driver.tree.assert_well_formed();
             });
+            driver.tree.pass(Duration::from_millis(10)).unwrap();
             if round % 3 == 0 {
                 driver.tree.settle().unwrap();
             }
@@ -74,11 +82,8 @@ fn the_hard_quota_is_never_exceeded() {
             }
         }
         let counts = driver.tree.counts();
-        eprintln!("{loading:?}: {counts:?}, {} not resident", driver.not_resident);
-        assert!(
-            (counts.refused > 20 || loading != Loading::Blocking) && counts.removals > 100,
-            "{loading:?}: {counts:?}"
-        );
+        eprintln!("{io:?}: {counts:?}, {} not resident", driver.not_resident);
+        assert!((counts.refused > 20 || io != Io::Blocking) && counts.removals > 100, "{io:?}: {counts:?}");
     }
 }
 
@@ -118,14 +123,14 @@ fn without_a_quota_to_keep_anything_nothing_is_kept() {
 #[test]
 fn faults_cost_nothing_but_time() {
     let (bytes, log) = built(14, &options(2, false, false));
-    for (seed, loading) in [(1, Loading::OnDemand), (2, Loading::Background), (3, Loading::Blocking)] {
+    for (seed, io) in (1..).zip(kinds()) {
         let faults =
             Faults { errors: 60, short: 60, flips: 60, delays: 30, delay: Duration::from_micros(200) };
         let source =
             Arc::new(Faulty::new(MemorySource::new("bytes", bytes.clone()), seed, Faults::default()));
         let file = Arc::new(XfmFile::open(source.clone()).unwrap());
         source.set(faults);
-        let mut driver = Driver::new(&file, background(loading));
+        let mut driver = Driver::new(&file, reading(io));
         driver.tree.set_quotas(file.resident_bytes_of_all() / 10, u64::MAX);
         let mut random = Random(seed);
         let mut counted = 0;
@@ -150,8 +155,8 @@ fn faults_cost_nothing_but_time() {
         driver.tree.settle().unwrap();
         driver.tree.begin_frame(&mut Vec::new()).unwrap();
         counted += driver.tree.end_frame().unwrap().faults;
-        assert!(source.befallen() > 10, "{loading:?}: only {} faults", source.befallen());
-        assert_eq!(counted, source.befallen(), "{loading:?}: every fault is counted");
+        assert!(source.befallen() > 10, "{io:?}: only {} faults", source.befallen());
+        assert_eq!(counted, source.befallen(), "{io:?}: every fault is counted");
         source.set(Faults::default());
         for _ in 0..1000 {
             driver.tree.begin_frame(&mut Vec::new()).unwrap();
@@ -161,7 +166,7 @@ fn faults_cost_nothing_but_time() {
             driver.tree.end_frame().unwrap();
             driver.tree.settle().unwrap();
         }
-        assert_eq!(driver.tree.displayed_triangles(), log.mesh.triangles.len() as u64, "{loading:?}");
+        assert_eq!(driver.tree.displayed_triangles(), log.mesh.triangles.len() as u64, "{io:?}");
         driver.assert_shows(&log);
     }
 }
@@ -173,7 +178,7 @@ fn a_store_that_stays_away_is_an_error() {
     let source = Arc::new(Faulty::new(MemorySource::new("bytes", bytes), 1, Faults::default()));
     let file = Arc::new(XfmFile::open(source.clone()).unwrap());
     source.set(Faults { errors: 1000, ..Faults::default() });
-    let mut driver = Driver::new(&file, background(Loading::OnDemand));
+    let mut driver = Driver::new(&file, reading(Io::Background));
     let root = driver.tree.roots()[0];
     let mut failed_after = 0;
     for attempt in 0..=ATTEMPTS {
@@ -193,29 +198,6 @@ fn a_store_that_stays_away_is_an_error() {
         driver.tree.settle().unwrap();
     }
     assert!(driver.active.contains(&root));
-}
-
-/// A slow store keeps no frame waiting; what is near is loaded before it is asked for.
-#[test]
-fn loads_ahead_spare_misses() {
-    let (bytes, _) = built(40, &options(3, false, true));
-    let misses = |loading| {
-        let slow = Throttled::new(MemorySource::new("bytes", bytes.clone()), Duration::from_micros(50), None);
-        let source = Arc::new(Counted::new(slow));
-        let file = Arc::new(XfmFile::open(source.clone()).unwrap());
-        let mut driver = Driver::new(&file, background(loading));
-        let mut random = Random(4);
-        for _ in 0..150 {
-            frame(&mut driver, &mut random, 9, &|_| ());
-            // The store has the time of a frame.
-            driver.tree.settle().unwrap();
-        }
-        (driver.not_resident, driver.tree.counts())
-    };
-    let (on_demand, with_ahead) = (misses(Loading::OnDemand), misses(Loading::Background));
-    eprintln!("{on_demand:?} {with_ahead:?}");
-    assert!(on_demand.1.ahead == 0 && with_ahead.1.ahead > 100);
-    assert!(with_ahead.0 * 5 < on_demand.0 * 4, "{} misses, {} without", with_ahead.0, on_demand.0);
 }
 
 /// What has just become a candidate stays for a while, whatever the soft quota; not so where the hard one is in need.

@@ -2,9 +2,10 @@
 
 use vertex_tree::NONE;
 
-use super::{Holder, InUse, Pager};
+use super::{Holder, Pager};
 use crate::lists::Class;
 use crate::page::Layout;
+use crate::settings::InUse;
 
 impl Pager {
     /// Whether every page is in memory. Then nothing is asked for and nothing evicted until less memory is allowed, and
@@ -33,13 +34,18 @@ impl Pager {
     /// A change has been made on a page: what is around it may be needed soon.
     #[inline(always)]
     pub fn touch(&mut self, holder: u32) {
-        if !self.is_complete() && self.holders[holder as usize].touched != self.frame {
+        let Holder { touched, ahead, .. } = self.holders[holder as usize];
+        if ahead || !self.is_complete() && touched != self.frame {
             self.touch_first(holder);
         }
     }
 
     pub(super) fn touch_first(&mut self, holder: u32) {
-        self.holders[holder as usize].touched = self.frame;
+        let slot = &mut self.holders[holder as usize];
+        slot.touched = self.frame;
+        if std::mem::take(&mut slot.ahead) {
+            self.stats.ahead_used += 1;
+        }
         self.classify(self.holders[holder as usize].page);
         if let Some(class) = self.lists.class(holder) {
             self.lists.push(holder, class);
@@ -104,7 +110,9 @@ impl Pager {
             return;
         }
         let untouched = self.holders[holder as usize].touched == 0;
+        let stays = self.in_use == InUse::Stays && self.usage[page as usize] > 0;
         let class = match (self.usage[page as usize], self.references[page as usize]) {
+            _ if !stays && self.foresight.is_foreseen(page) => Class::Foreseen,
             (0, 0) => Class::Free,
             // Where pages yield, what has been of no use yet goes first.
             _ if self.in_use == InUse::Yields => {

@@ -3,9 +3,9 @@
 
 use std::sync::Arc;
 
-use meta_node::{BuildOptions, MetaNodeError, MetaNodeFile};
+use meta_node::{BuildOptions, MetaNodeError, MetaNodeFile, MetaNodeTree};
 use vertex_tree::source::MemorySource;
-use vertex_tree::{Bounds, Collapse, CollapseLog, Mesh};
+use vertex_tree::{Bounds, Collapse, CollapseLog, Mesh, NodeId, NullSink, Step, VertexTree};
 
 /// A small generator with a fixed sequence.
 pub struct Random(pub u64);
@@ -64,4 +64,65 @@ pub fn bytes(log: &CollapseLog, options: &BuildOptions) -> Vec<u8> {
 
 pub fn open(bytes: impl Into<Arc<[u8]>>) -> Result<MetaNodeFile, MetaNodeError> {
     MetaNodeFile::open(Arc::new(MemorySource::new("tree", bytes)))
+}
+
+/// A front, as an engine keeps it: which nodes are active, and which can change.
+pub struct Front {
+    pub active: Vec<NodeId>,
+    pub boundary: Vec<NodeId>,
+}
+
+impl Front {
+    pub fn new(tree: &MetaNodeTree) -> Self {
+        Self { active: Vec::new(), boundary: tree.roots().to_vec() }
+    }
+
+    /// Tries to unfold every boundary node once. Says how many did, and how many were refused.
+    pub fn unfold(&mut self, tree: &mut MetaNodeTree) -> (usize, usize) {
+        let (mut done, mut refused) = (0, 0);
+        for node in std::mem::take(&mut self.boundary) {
+            match tree.unfold(node, &mut NullSink).unwrap() {
+                Step::Done => {
+                    done += 1;
+                    self.active.push(node);
+                    self.boundary.extend(tree.children(node));
+                }
+                Step::NotResident => {
+                    refused += 1;
+                    self.boundary.push(node);
+                }
+                step => panic!("{step:?}"),
+            }
+        }
+        (done, refused)
+    }
+
+    /// Tries to fold nodes, the last unfolded first, until one is refused.
+    pub fn fold(&mut self, tree: &mut MetaNodeTree) -> usize {
+        let mut done = 0;
+        while let Some(&node) = self.active.last() {
+            if tree.fold(node, &mut NullSink).unwrap() != Step::Done {
+                break;
+            }
+            done += 1;
+            self.active.pop();
+            let children: Vec<NodeId> = tree.children(node).collect();
+            self.boundary.retain(|node| !children.contains(node));
+            self.boundary.push(node);
+        }
+        done
+    }
+}
+
+pub fn frame<R>(
+    tree: &mut MetaNodeTree,
+    change: impl FnOnce(&mut MetaNodeTree) -> R,
+) -> (R, vertex_tree::PageStats) {
+    tree.begin_frame(&mut Vec::new()).unwrap();
+    let changed = change(tree);
+    (changed, tree.end_frame().unwrap())
+}
+
+pub fn holder_bytes(file: &MetaNodeFile) -> u64 {
+    file.facts().iter().find(|(fact, _)| *fact == "largest page, bytes").unwrap().1.parse().unwrap()
 }

@@ -29,6 +29,17 @@ impl MappedSource {
         Ok(Self { name: path.display().to_string(), map })
     }
 
+    /// Says that accesses will be in no order: the operating system then reads nothing around what is touched. Does nothing
+    /// where it can not be told.
+    ///
+    /// # Errors
+    /// What the operating system says.
+    pub fn expect_random_access(&self) -> io::Result<()> {
+        #[cfg(unix)]
+        self.map.advise(memmap2::Advice::Random)?;
+        Ok(())
+    }
+
     /// The bytes of the file.
     #[must_use]
     pub fn bytes(&self) -> &[u8] {
