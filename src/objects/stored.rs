@@ -10,7 +10,7 @@ use std::time::Duration;
 use mt_partition::{MtError, MtFile, MtTree, Reader};
 use rustc_hash::FxHashMap;
 use vertex_tree::source::FileSource;
-use vertex_tree::{NullSink, TreeError, VertexTree};
+use vertex_tree::{NullSink, TreeError};
 
 use super::{Objects, Placement, SceneFileError, read_scene};
 use crate::engine::{FrameReport, Settings};
