@@ -381,7 +381,10 @@ impl Paging {
             }
         }
         self.deferred = deferred;
-        self.fetch_ahead();
+        // What is foreseen may not take the room that a refused change waits for.
+        if self.wanted == 0 && self.first.is_none() {
+            self.fetch_ahead();
+        }
         if self.wanted > 0 || self.has_told {
             self.residents.memory().want(self.member, self.wanted);
             self.has_told = self.wanted > 0;
