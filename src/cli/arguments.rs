@@ -130,6 +130,9 @@ pub(super) struct Refinement {
     /// What is compared with the tolerance.
     #[arg(long, value_enum, default_value = "error")]
     pub criterion: CriterionName,
+    /// Leave coarse what is seen from behind (detail-block; others have no cones of normals).
+    #[arg(long)]
+    pub normal_cone: bool,
     /// Tolerance as a share of half the image's height.
     #[arg(long, value_parser = positive, conflicts_with = "pixels")]
     pub theta: Option<f64>,

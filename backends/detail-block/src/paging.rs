@@ -5,10 +5,11 @@
 //! at the end of a queue. Whether it still is a candidate is looked at when it comes to the front of the queue.
 //!
 //! * Beyond the **soft quota**, candidates are removed at the end of each frame, the least recently used first, once they
-//!   have been candidates for some frames, and only if the node above is folded: what hangs below an active node may be
-//!   unfolded next, and the paper's update loop (Figure 8) would load it again at once.
+//!   have been candidates for some frames and are not expected back (see [`returns`](crate::returns)), and only if the
+//!   node above is folded: what hangs below an active node may be unfolded next, and the paper's update loop (Figure 8)
+//!   would load it again at once.
 //! * The **hard quota** is never exceeded: a block is only asked for if it fits, with all that are under way; candidates
-//!   that this frame has not used make room, and if that is not enough, the block is missed. (Setting a quota below what
+//!   that no change has lately used make room, and if that is not enough, the block is missed. (Setting a quota below what
 //!   the front itself occupies is the exception: nothing is loaded then until the front has folded to below it.)
 //!
 //! Blocks of active nodes are never removed, so whatever is active can be asked about. A root of a block that is in play

@@ -31,7 +31,7 @@ mod star_mesh;
 mod stars;
 mod tree;
 
-pub use bounds::Bounds;
+pub use bounds::{Bounds, NormalCone};
 pub use log::{Collapse, CollapseLog, Forest, LogError, NONE};
 pub use log_file::{LogCounts, LogFileError, read_log, write_log, write_log_from};
 pub use log_source::{LogFile, LogSource, Records};
