@@ -46,11 +46,6 @@ impl FrontScan {
         }
     }
 
-    /// What is watched, boundary nodes and collapsible nodes; tags are slots.
-    pub fn watched(&self) -> [(&Packed, Kind); 2] {
-        [(&self.folded, Kind::Unfold), (&self.unfolded, Kind::Fold)]
-    }
-
     fn packed(&mut self, unfolded: bool) -> &mut Packed {
         if unfolded { &mut self.unfolded } else { &mut self.folded }
     }
