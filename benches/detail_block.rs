@@ -1,9 +1,11 @@
 //! The experiments of XFastMesh (DeCoro & Pajarola 2002) on detail blocks: sizes (their Table 1), construction (Table 2),
 //! frames (Table 3), the tolerance steered to a frame time (Figure 10); and what they did not report: blocks that are
-//! loaded again soon after their removal, what forcing costs against nesting, and what quantisation costs in pixels.
+//! loaded again soon after their removal, what forcing costs against nesting, what the normal-cone test spares, and what
+//! quantisation costs in pixels.
 //!
 //! `cargo bench --bench detail_block` runs all on bunny, horse, dragon and happy; with names after `--`, on those alone:
-//! of `bunny horse dragon happy sierra alps city laserscan`. Meshes are taken from `shared/data` beside the repository.
+//! of `bunny horse dragon happy sierra alps city laserscan`. Meshes are taken from `shared/data` beside the repository;
+//! `sierra` is one tile of the Sierra Nevada.
 
 use std::path::PathBuf;
 use std::sync::Arc;
@@ -45,9 +47,7 @@ fn subject(name: &str) -> Option<(Mesh, Vec<Path>)> {
         return Some((Scene::new(kind).mesh(&mut |_, _| {}), calm));
     }
     let files: Vec<PathBuf> = match name {
-        "sierra" => ["N37W119", "N37W118", "N36W119", "N36W118"]
-            .map(|tile| data.join(format!("terrain/{tile}.hgt")))
-            .to_vec(),
+        "sierra" => vec![data.join("terrain/N37W119.hgt")],
         _ => vec![data.join(format!("meshes/{name}.ply"))],
     };
     if !files.iter().all(|file| file.exists()) {
@@ -91,10 +91,13 @@ fn engine<M: MeshSink>(
         soft_quota: (soft * file.resident_bytes_of_all() as f64) as u64,
         ..detail_block::Settings::default()
     };
-    let usual = path.motion_percentile(99.0);
-    let settings = Settings { strategy, rho: usual.rho, omega: usual.omega, ..Settings::default() };
     let tree = XfmTree::new(file.clone(), paging).expect("no thread is started");
-    Engine::new(tree, mesh, settings).expect("the store is there")
+    Engine::new(tree, mesh, settings(path, strategy)).expect("the store is there")
+}
+
+fn settings(path: &Path, strategy: Strategy) -> Settings {
+    let usual = path.motion_percentile(99.0);
+    Settings { strategy, rho: usual.rho, omega: usual.omega, ..Settings::default() }
 }
 
 fn view(path: &Path, frame: usize) -> View {
@@ -162,6 +165,35 @@ fn nesting(name: &str, nested: &Arc<XfmFile>, forcing: &Arc<XfmFile>, path: &Pat
     };
     let ((n, t, f), (m, s, g)) = (run(nested), run(forcing));
     println!("| {name}, {} | {n} | {t} | {f:.2} % | {m} | {s} | {g:.2} % |", path.name);
+}
+
+/// What the normal-cone test spares and costs along one path, with memory for everything.
+fn cones(name: &str, file: &Arc<XfmFile>, path: &Path, strategy: Strategy) {
+    let run = |normal_cone: bool| {
+        let paging = detail_block::Settings { io: Io::Blocking, ..detail_block::Settings::default() };
+        let tree = XfmTree::new(file.clone(), paging).expect("no thread is started");
+        let settings = Settings { normal_cone, ..settings(path, strategy) };
+        let mut engine = Engine::new(tree, NullSink, settings).expect("the store is there");
+        let (mut triangles, mut updates, mut tests, mut times) = (0, 0, 0, Vec::new());
+        for frame in 0..path.frames.len() {
+            let report = engine.advance(&[view(path, frame)]).expect("the store is there");
+            if frame > 0 {
+                triangles += report.triangles;
+                updates += report.unfolds + report.folds;
+                tests += report.tests;
+                times.push(report.select.as_secs_f64() * 1e3);
+            }
+        }
+        times.sort_by(f64::total_cmp);
+        let n = times.len() as u64;
+        (triangles / n, updates / n, tests / n, times[times.len() / 2])
+    };
+    let ((t, u, n, ms), (tc, uc, nc, msc)) = (run(false), run(true));
+    println!(
+        "| {name}, {}, {} | {t} | {u} | {n} | {ms:.3} | {tc} | {uc} | {nc} | {msc:.3} |",
+        path.name,
+        strategy.name()
+    );
 }
 
 /// Distances to the original in pixels: 99 % and largest, the worse of both ways, over some frames.
@@ -272,6 +304,15 @@ fn main() {
         println!("| --- | --- | --- | --- | --- | --- | --- |");
         for path in &paths {
             nesting(&name, &plain.file, &forcing.file, path);
+        }
+        println!(
+            "\n| normal cone | without: shown | updates | tests | median, ms | with: shown | updates | tests | median, ms |"
+        );
+        println!("| --- | --- | --- | --- | --- | --- | --- | --- | --- |");
+        for path in &paths {
+            for strategy in [Strategy::TopDown, Strategy::Front, Strategy::Event] {
+                cones(&name, &plain.file, path, strategy);
+            }
         }
         if name != "sierra" {
             println!(

@@ -6,11 +6,11 @@
 
 use std::collections::VecDeque;
 
-use vertex_tree::{Bounds, MeshSink, NodeId, NullSink, Step, TreeError, VertexTree};
+use vertex_tree::{Bounds, MeshSink, NodeId, NormalCone, NullSink, Step, TreeError, VertexTree};
 
-use crate::criterion::Criterion;
-use crate::engine::Engine;
+use crate::engine::{Engine, Settings};
 use crate::front::mix;
+use crate::normal_cone;
 use crate::view::View;
 
 /// Bounds and structural parents of all nodes, parents before their children.
@@ -25,6 +25,7 @@ pub struct BruteForce {
 #[derive(Clone, Debug)]
 struct Node {
     bounds: Bounds,
+    cone: NormalCone,
     log_number: u32,
     parents: Vec<u32>,
 }
@@ -48,6 +49,11 @@ impl BruteForce {
         self.places[node.index()] = self.nodes.len() as u32;
         self.nodes.push(Node {
             bounds: tree.bounds(node),
+            // As in an engine, where roots have none.
+            cone: match tree.parents(node).next() {
+                Some(_) if T::HAS_CONES => tree.normal_cone(node),
+                _ => NormalCone::NONE,
+            },
             log_number: tree.log_number(node),
             parents: tree.parents(node).map(|parent| self.places[parent.index()]).collect(),
         });
@@ -55,7 +61,7 @@ impl BruteForce {
 
     /// How many nodes of an engine's front have not the status that brute force gives them for the engine's own views.
     pub fn wrong<T: VertexTree, M: MeshSink>(&mut self, engine: &Engine<T, M>) -> u64 {
-        let (hash, count) = self.cut(engine.settings().criterion, engine.views());
+        let (hash, count) = self.cut(engine.settings(), engine.views());
         if (hash, count) == (engine.front().cut_hash(), engine.front().active_nodes()) {
             return 0;
         }
@@ -76,7 +82,7 @@ impl BruteForce {
         engine: &Engine<T, M>,
         has_dependencies: bool,
     ) -> u64 {
-        self.cut(engine.settings().criterion, engine.views());
+        self.cut(engine.settings(), engine.views());
         let mut is_active = vec![false; self.nodes.len()];
         engine.for_each_active(|node| is_active[self.places[node.index()] as usize] = true);
         let mut is_missing = vec![false; self.nodes.len()];
@@ -104,9 +110,13 @@ impl BruteForce {
     }
 
     /// Tests every node and closes upwards; returns the hash and the size of the cut.
-    fn cut(&mut self, criterion: Criterion, views: &[View]) -> (u64, usize) {
+    fn cut(&mut self, settings: &Settings, views: &[View]) -> (u64, usize) {
+        let criterion = settings.criterion;
         for (active, node) in self.active.iter_mut().zip(&self.nodes) {
-            *active = criterion.unfold(views, &node.bounds);
+            *active = match settings.normal_cone {
+                true => normal_cone::unfold(criterion, views, &node.bounds, &node.cone),
+                false => criterion.unfold(views, &node.bounds),
+            };
         }
         let (mut hash, mut count) = (0_u64, 0);
         for (at, node) in self.nodes.iter().enumerate().rev() {

@@ -46,6 +46,8 @@ pub struct Options {
     pub strategies: Vec<Strategy>,
     /// What "coarse" means.
     pub criterion: Criterion,
+    /// Whether what is seen from behind stays coarse, see [`Settings::normal_cone`].
+    pub normal_cone: bool,
     /// Tolerance as a share of half the image's height.
     pub theta: f64,
     /// What a frame may cost.
@@ -114,6 +116,7 @@ impl Default for Options {
         Self {
             strategies: Strategy::ALL.to_vec(),
             criterion: Criterion::default(),
+            normal_cone: false,
             theta: theta_of_pixels(1.0, 1080),
             budget: Budget::None,
             work_cap: WorkCap::None,
@@ -401,7 +404,8 @@ impl Subject {
     /// [`CompareError::Store`], [`CompareError::Tree`].
     pub fn frame(&self, path: &Path, frame: usize, options: &Options) -> Result<Mesh, CompareError> {
         let strategy = Strategy::TopDown;
-        let settings = Settings { strategy, criterion: options.criterion, ..Settings::default() };
+        let Options { criterion, normal_cone, .. } = *options;
+        let settings = Settings { strategy, criterion, normal_cone, ..Settings::default() };
         let view = View::new(&path.camera(frame), options.theta);
         with_trees!(self, |open| {
             let opening = Opening { paging: options.paging, ..Opening::SETTLED };
@@ -502,6 +506,7 @@ impl Subject {
                 let settings = Settings {
                     strategy,
                     criterion: options.criterion,
+                    normal_cone: options.normal_cone,
                     rho: speed.rho,
                     omega: speed.omega,
                     budget: options.budget,

@@ -20,6 +20,7 @@ use crate::criterion::Criterion;
 use crate::foresight::{Foresight, Watched};
 use crate::front::Front;
 use crate::motion::{Odometer, Speed};
+use crate::normal_cone::Cones;
 use crate::queue::Kind;
 use crate::refine::{Finder, Flips, Frame, Strategy, Watch, with_strategy};
 use crate::view::View;
@@ -31,6 +32,9 @@ pub struct Settings {
     pub strategy: Strategy,
     /// What "coarse" means.
     pub criterion: Criterion,
+    /// Whether a node is only unfolded for views that do not see all below it from behind, where the backend knows
+    /// ([`VertexTree::HAS_CONES`]).
+    pub normal_cone: bool,
     /// Declared full speed of the camera, `rho` and `omega`; `kappa` is set by the engine.
     pub rho: f64,
     /// See [`Speed::omega`].
@@ -47,6 +51,7 @@ impl Default for Settings {
         Self {
             strategy: Strategy::Event,
             criterion: Criterion::ScreenError,
+            normal_cone: false,
             rho: 1.0,
             omega: 0.02,
             budget: Budget::None,
@@ -127,6 +132,7 @@ pub struct Engine<T, M> {
     tree: T,
     mesh: M,
     front: Front,
+    cones: Cones,
     finder: Finder,
     settings: Settings,
     odometer: Odometer,
@@ -163,6 +169,7 @@ impl<T: VertexTree, M: MeshSink> Engine<T, M> {
             views: &[],
             speed: Speed { rho: settings.rho, omega: settings.omega, kappa: 0.0 },
             motion: crate::motion::Motion::Unbounded,
+            cones: None,
         };
         for root in front.roots() {
             with_strategy!(&mut finder, |s| s.watch(&frame, root, Kind::Unfold, front.bounds(root)));
@@ -172,6 +179,7 @@ impl<T: VertexTree, M: MeshSink> Engine<T, M> {
             tree,
             mesh,
             front,
+            cones: Cones::default(),
             finder,
             settings,
             odometer: Odometer::default(),
@@ -282,7 +290,8 @@ impl<T: VertexTree, M: MeshSink> Engine<T, M> {
         if redeclared {
             motion = crate::motion::Motion::Unbounded;
         }
-        let frame = Frame { criterion: self.settings.criterion, views: &self.views, speed, motion };
+        let cones = (T::HAS_CONES && self.settings.normal_cone).then_some(&self.cones);
+        let frame = Frame { criterion: self.settings.criterion, views: &self.views, speed, motion, cones };
 
         self.flips.unfold.clear();
         self.flips.fold.clear();

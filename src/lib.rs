@@ -76,6 +76,7 @@ pub mod front;
 mod frustum;
 pub mod mesh_io;
 pub mod motion;
+pub mod normal_cone;
 pub mod objects;
 pub mod oracle;
 mod packed;

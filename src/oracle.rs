@@ -3,17 +3,20 @@
 //! Every node of the hierarchy is tested, nothing is remembered and no order is relied on. The cut is the closure
 //! upwards of the nodes that some view wants.
 
-use vertex_tree::{Bounds, CollapseLog, Forest, LogError, NONE, VertexTree};
+use vertex_tree::{Bounds, CollapseLog, Forest, LogError, NONE, NormalCone, VertexTree};
 
 use crate::criterion::Criterion;
 use crate::engine::Engine;
 use crate::front::mix;
+use crate::normal_cone;
 use crate::view::View;
 
 /// Bounds and parents of all nodes, in the order of the collapse log.
 #[derive(Clone, Debug)]
 pub struct Oracle {
     bounds: Vec<Bounds>,
+    /// Of all nodes, or empty where the normal-cone test is no part of the criterion.
+    cones: Vec<NormalCone>,
     parent: Vec<u32>,
     active: Vec<bool>,
     hash: u64,
@@ -47,6 +50,7 @@ impl Oracle {
     pub fn with_forest(log: &CollapseLog, forest: Forest) -> Self {
         Self {
             bounds: log.collapses.iter().map(|c| c.bounds).collect(),
+            cones: Vec::new(),
             active: vec![false; forest.parent.len()],
             parent: forest.parent,
             hash: 0,
@@ -54,10 +58,23 @@ impl Oracle {
         }
     }
 
+    /// The same with the normal-cone test: a cone for each collapse of the log.
+    ///
+    /// # Panics
+    /// If there are more or fewer.
+    #[must_use]
+    pub fn with_cones(self, cones: Vec<NormalCone>) -> Self {
+        assert_eq!(cones.len(), self.bounds.len(), "one cone for each collapse");
+        Self { cones, ..self }
+    }
+
     /// Finds the cut for these views.
     pub fn cut(&mut self, criterion: Criterion, views: &[View]) -> &[bool] {
         let nodes = self.active.iter_mut().zip(&self.bounds);
         match views {
+            _ if !self.cones.is_empty() => nodes.zip(&self.cones).for_each(|((active, bounds), cone)| {
+                *active = normal_cone::unfold(criterion, views, bounds, cone);
+            }),
             // One view is the rule, and worth a loop without a loop in it.
             [view] => nodes.for_each(|(active, bounds)| *active = criterion.unfold_for(view, bounds)),
             _ => nodes.for_each(|(active, bounds)| *active = criterion.unfold(views, bounds)),

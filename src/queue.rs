@@ -304,8 +304,14 @@ pub struct EventQueue {
     tickets: Vec<u16>,
     /// Events in the buckets, cancelled ones included.
     stored: usize,
-    /// An upper bound on the cancelled ones among them.
+    /// An upper bound on the cancelled ones among them: how often something was cancelled, less what has been dropped. It
+    /// is more than those that there are by the events that had come up, for nodes that were then changed.
     cancelled: usize,
+    /// Cancelled events that have been dropped.
+    dropped: usize,
+    /// The bucket, through all wheels, that the sweep under way comes to next, and `cancelled + dropped` when it began.
+    next_swept: usize,
+    cancels_before: usize,
 }
 
 impl EventQueue {
@@ -321,6 +327,9 @@ impl EventQueue {
             tickets: Vec::new(),
             stored: 0,
             cancelled: 0,
+            dropped: 0,
+            next_swept: 0,
+            cancels_before: 0,
         }
     }
 
@@ -382,30 +391,55 @@ impl EventQueue {
         let wrapped = *ticket == 0;
         self.cancelled += 1;
         // A ticket that has come round could bring an old event back to life: sweep before it can. Otherwise sweep
-        // when half of what is stored may be garbage: a constant share of the work that put it there.
-        if wrapped || self.cancelled > self.stored / 2 + 1024 {
-            self.sweep();
+        // while half of what is stored may be garbage, bucket by bucket, so that no frame pays for all of it.
+        if wrapped {
+            self.sweep_all();
+        } else if self.cancelled > self.stored / 2 + 1024 {
+            self.sweep_on();
         }
     }
 
+    /// Sweeps the next bucket that is not empty.
     #[cold]
-    fn sweep(&mut self) {
-        let Self { wheels, pool, pressing, ripe, swept, tickets, .. } = self;
-        self.stored = 0;
-        let buckets = wheels.iter_mut().flat_map(|wheel| wheel.levels.as_flattened_mut());
-        let mut due = [Event::BLANK; DUE];
-        for bucket in buckets.chain(ripe).chain([pressing]) {
-            swept.clear();
-            while *bucket != 0 {
-                let is_valid = |event: &Event| tickets[event.slot.index()] == event.ticket();
-                let (count, _) = pool.take(bucket, &mut due, 0, is_valid);
-                swept.extend_from_slice(&due[..count]);
-            }
-            swept.iter().for_each(|&event| pool.push(bucket, event));
-            self.stored += swept.len();
+    fn sweep_on(&mut self) {
+        let buckets = self.wheels.len() * LEVELS * SLOTS as usize;
+        if self.next_swept == 0 {
+            self.cancels_before = self.cancelled + self.dropped;
         }
-        self.ripe.retain(|&bucket| bucket != 0);
+        while self.next_swept < buckets {
+            let at = self.next_swept;
+            self.next_swept += 1;
+            let wheel = &mut self.wheels[at / (LEVELS * SLOTS as usize)];
+            let bucket = &mut wheel.levels.as_flattened_mut()[at % (LEVELS * SLOTS as usize)];
+            if *bucket != 0 {
+                let dropped = sweep(&mut self.pool, bucket, &mut self.swept, &self.tickets);
+                self.drop_cancelled(dropped);
+                return;
+            }
+        }
+        // Once round: what was cancelled before is gone, so no more can be left than have been cancelled since.
+        self.next_swept = 0;
+        self.cancelled = self.cancelled + self.dropped - self.cancels_before;
+    }
+
+    #[cold]
+    fn sweep_all(&mut self) {
+        let Self { wheels, pool, pressing, ripe, swept, tickets, .. } = self;
+        let buckets = wheels.iter_mut().flat_map(|wheel| wheel.levels.as_flattened_mut());
+        let all = buckets.chain(&mut *ripe).chain([pressing]);
+        let dropped = all.map(|bucket| sweep(pool, bucket, swept, tickets)).sum();
+        ripe.retain(|&bucket| bucket != 0);
+        self.drop_cancelled(dropped);
         self.cancelled = 0;
+        self.next_swept = 0;
+    }
+
+    /// So many cancelled events are no longer stored.
+    #[inline(always)]
+    fn drop_cancelled(&mut self, count: usize) {
+        self.stored -= count;
+        self.cancelled = self.cancelled.saturating_sub(count);
+        self.dropped += count;
     }
 
     /// Reads the tickets of nodes into the cache that are about to be cancelled or given events.
@@ -473,7 +507,7 @@ impl EventQueue {
     /// ones in `due`. Those that are scheduled meanwhile do not come up before their clock advances again.
     #[inline(always)]
     pub fn next_due(&mut self, due: &mut [Event; DUE]) -> usize {
-        let Self { ripe, pool, tickets, stored, cancelled, .. } = self;
+        let Self { ripe, pool, tickets, stored, cancelled, dropped, .. } = self;
         let mut count = 0;
         while count < DUE
             && let Some(bucket) = ripe.last_mut()
@@ -482,6 +516,7 @@ impl EventQueue {
             let (now, taken) = pool.take(bucket, due, count, is_valid);
             *stored -= taken;
             *cancelled = cancelled.saturating_sub(taken - (now - count));
+            *dropped += taken - (now - count);
             count = now;
             if *bucket == 0 {
                 ripe.pop();
@@ -492,4 +527,18 @@ impl EventQueue {
         }
         count
     }
+}
+
+/// Drops the cancelled events in a bucket and returns how many there were. `kept` is used for its allocation.
+fn sweep(pool: &mut Pool, bucket: &mut Bucket, kept: &mut Vec<Event>, tickets: &[u16]) -> usize {
+    kept.clear();
+    let (mut due, mut all) = ([Event::BLANK; DUE], 0);
+    while *bucket != 0 {
+        let is_valid = |event: &Event| tickets[event.slot.index()] == event.ticket();
+        let (count, taken) = pool.take(bucket, &mut due, 0, is_valid);
+        kept.extend_from_slice(&due[..count]);
+        all += taken;
+    }
+    kept.iter().for_each(|&event| pool.push(bucket, event));
+    all - kept.len()
 }

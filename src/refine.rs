@@ -10,7 +10,8 @@ use vertex_tree::Bounds;
 
 use crate::criterion::Criterion;
 use crate::front::{Front, Slot};
-use crate::motion::{Motion, Speed};
+use crate::motion::{Course, Motion, Speed};
+use crate::normal_cone::{self, Cones};
 use crate::queue::Kind;
 use crate::view::View;
 
@@ -56,18 +57,54 @@ pub(crate) struct Frame<'a> {
     pub views: &'a [View],
     pub speed: Speed,
     pub motion: Motion,
+    /// Of the nodes in play, where the normal-cone test is part of the criterion.
+    pub cones: Option<&'a Cones>,
 }
 
 impl Frame<'_> {
+    /// Whether the node in a slot, which has these bounds, is wanted.
     #[inline]
-    pub fn unfold(&self, bounds: &Bounds) -> bool {
-        self.criterion.unfold(self.views, bounds)
+    pub fn unfold(&self, slot: Slot, bounds: &Bounds) -> bool {
+        self.criterion.unfold(self.views, bounds) && self.is_seen(slot, bounds)
     }
 
-    /// The same of two nodes.
+    /// Whether it would be in other views.
+    pub fn unfold_in(&self, views: &[View], slot: Slot, bounds: &Bounds) -> bool {
+        match self.cones {
+            None => self.criterion.unfold(views, bounds),
+            Some(cones) => normal_cone::unfold(self.criterion, views, bounds, &cones.of(slot)),
+        }
+    }
+
+    /// [`unfold`](Self::unfold) of two nodes.
     #[inline(always)]
-    pub fn unfold_both(&self, bounds: [&Bounds; 2]) -> [bool; 2] {
-        self.criterion.unfold_both(self.views, bounds)
+    pub fn unfold_both(&self, slots: [Slot; 2], bounds: [&Bounds; 2]) -> [bool; 2] {
+        let wanted = self.criterion.unfold_both(self.views, bounds);
+        match self.cones {
+            None => wanted,
+            Some(_) => [0, 1].map(|i| wanted[i] && self.is_seen(slots[i], bounds[i])),
+        }
+    }
+
+    /// Whether one of the views that want a node does not see it from behind.
+    #[inline]
+    fn is_seen(&self, slot: Slot, bounds: &Bounds) -> bool {
+        self.cones
+            .is_none_or(|cones| normal_cone::unfold(self.criterion, self.views, bounds, &cones.of(slot)))
+    }
+
+    /// How many frames on a course must pass before the node in a slot can have to change.
+    #[inline]
+    pub fn earliest(&self, course: &Course, slot: Slot, kind: Kind, bounds: &Bounds) -> f64 {
+        let (criterion, views) = (self.criterion, self.views);
+        match (self.cones.map(|cones| cones.of(slot)), kind) {
+            (None, Kind::Unfold) => criterion.earliest_unfold(views, course, bounds),
+            (None, Kind::Fold) => criterion.earliest_fold(views, course, bounds),
+            (Some(cone), Kind::Unfold) => {
+                normal_cone::earliest_unfold(criterion, views, course, bounds, &cone)
+            }
+            (Some(cone), Kind::Fold) => normal_cone::earliest_fold(criterion, views, course, bounds, &cone),
+        }
     }
 }
 

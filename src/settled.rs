@@ -1,6 +1,6 @@
 //! A backend that waits for its pages: for replays whose cuts can be compared in every frame, not for viewers.
 
-use vertex_tree::{Bounds, MeshSink, NodeId, PageStats, Step, TreeError, VertexTree};
+use vertex_tree::{Bounds, MeshSink, NodeId, NormalCone, PageStats, Step, TreeError, VertexTree};
 
 /// Waits inside of a change until what it needs has come. A change that still is refused then, as memory is too small for
 /// it, is a miss.
@@ -45,6 +45,7 @@ impl<T: VertexTree> Settled<T> {
 impl<T: VertexTree> VertexTree for Settled<T> {
     const IS_TREE: bool = T::IS_TREE;
     const PREPARATION: usize = T::PREPARATION;
+    const HAS_CONES: bool = T::HAS_CONES;
 
     fn node_limit(&self) -> u32 {
         self.tree.node_limit()
@@ -60,6 +61,9 @@ impl<T: VertexTree> VertexTree for Settled<T> {
     }
     fn children_and_bounds(&self, node: NodeId) -> impl Iterator<Item = (NodeId, Bounds)> {
         self.tree.children_and_bounds(node)
+    }
+    fn normal_cone(&self, node: NodeId) -> NormalCone {
+        self.tree.normal_cone(node)
     }
     fn prepare<M: MeshSink>(&self, node: NodeId, step: usize, mesh: &M) {
         self.tree.prepare(node, step, mesh);

@@ -7,6 +7,7 @@ mod key_counts;
 mod legality;
 mod marks;
 mod nodes;
+mod order;
 mod out_of_core;
 mod quadric;
 mod rounds;
@@ -23,7 +24,7 @@ use glam::{DVec3, Vec3};
 use vertex_tree::{Collapse, CollapseLog, LogError, Mesh};
 
 use crate::progress::Progress;
-pub use out_of_core::{LEAST_MEMORY, Limits, OutOfCoreError, build_within};
+pub use out_of_core::{LEAST_MEMORY, Limits, MOST_THREADS, OutOfCoreError, build_within};
 
 use marks::Marks;
 use nodes::{Nodes, round_up};
@@ -138,6 +139,7 @@ pub fn build(mesh: Mesh, options: &Options, progress: Progress) -> Result<(Colla
     let mut rounds = Vec::new();
     let run = builder.run(
         all,
+        order.len() as u32,
         |v| v,
         |builder, nodes, limit| {
             rounds.push((nodes, limit));

@@ -2,13 +2,16 @@
 
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
+use std::sync::atomic::AtomicBool;
 
 use detail_block::{XfmError, XfmFile};
 use in_memory::Hierarchy;
 use meta_node::{MetaNodeError, MetaNodeFile};
 use mt_partition::{MtError, MtFile};
 use vertex_tree::source::{FileSource, PageSource};
-use vertex_tree::{CollapseLog, LogError, LogFileError, read_log, write_log};
+use vertex_tree::{
+    CollapseLog, LogError, LogFile, LogFileError, LogSource, read_log, write_log, write_log_from,
+};
 
 /// Where a hierarchy is kept.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
@@ -82,6 +85,21 @@ pub enum StoreError {
         /// The file.
         file: PathBuf,
     },
+    /// A backend's file can only be written from a log that is in memory, and there is not enough.
+    #[error(
+        "files of {} are written from memory: about {} MB are needed for {triangles} triangles, {} MB are allowed",
+        backend.name(), needed >> 20, given >> 20
+    )]
+    Memory {
+        /// The backend.
+        backend: Backend,
+        /// Bytes, as estimated.
+        needed: u64,
+        /// Bytes.
+        given: u64,
+        /// Of the input.
+        triangles: u64,
+    },
     /// A collapse log is damaged.
     #[error(transparent)]
     LogFile(#[from] LogFileError),
@@ -138,6 +156,70 @@ pub fn write(
             build.patch = options.patch.unwrap_or(build.patch);
             build.partition = options.partition.unwrap_or(build.partition);
             mt_partition::write(file, log, &build)?;
+        }
+    }
+    Ok(())
+}
+
+/// The limits of [`write_within`].
+#[derive(Clone, Debug)]
+pub struct WriteLimits<'a> {
+    /// Bytes of memory.
+    pub memory: u64,
+    /// Where temporary files are made.
+    pub temporary: PathBuf,
+    /// Set by whoever wants it to end.
+    pub stop: &'a AtomicBool,
+}
+
+impl WriteLimits<'_> {
+    /// Fails if a backend's file can not be written for a mesh of so many vertices and triangles: detail blocks and
+    /// multi-triangulations need the log and what they make of it in memory.
+    ///
+    /// # Errors
+    /// [`StoreError::Memory`].
+    pub fn check(&self, backend: Backend, vertices: u64, triangles: u64) -> Result<(), StoreError> {
+        let [a_vertex, a_triangle] = match backend {
+            Backend::InMemory | Backend::MetaNode => [0, 0],
+            // Log and forest: 56 and 12 bytes. What comes to that is what each crate says of itself.
+            Backend::DetailBlock => [56 + 100, 12 + 60],
+            Backend::MtPartition => [56, 12 + 200],
+        };
+        let needed = vertices * a_vertex + triangles * a_triangle;
+        if needed > self.memory {
+            return Err(StoreError::Memory { backend, needed, given: self.memory, triangles });
+        }
+        Ok(())
+    }
+}
+
+/// Writes a log that is in a file as the file of a backend, whole or not at all, within limits.
+///
+/// # Errors
+/// [`StoreError::Memory`], and what the backend says.
+pub fn write_within(
+    backend: Backend,
+    file: &Path,
+    log: &LogFile,
+    options: &BuildOptions,
+    limits: &WriteLimits<'_>,
+) -> Result<(), StoreError> {
+    let counts = log.counts();
+    limits.check(backend, counts.vertices, counts.triangles)?;
+    match backend {
+        Backend::InMemory => {
+            write_log_from(file, counts, log.positions(), log.triangles(), log.collapses())?;
+        }
+        Backend::MetaNode => {
+            let options = meta_node::BuildOptions { levels: options.levels, ..Default::default() };
+            // What the writer needs beside its workspace.
+            let memory = limits.memory.saturating_sub(7 * counts.vertices);
+            let workspace =
+                meta_node::Workspace { folder: limits.temporary.clone(), memory, stop: limits.stop };
+            meta_node::write_within(file, log, &options, &workspace)?;
+        }
+        Backend::DetailBlock | Backend::MtPartition => {
+            write(backend, file, &read_log(log.path())?, options)?;
         }
     }
     Ok(())

@@ -18,9 +18,11 @@ use crate::misses::PATHS;
 use crate::selection::settings;
 use crate::subject::{fact, imported, log, meta_nodes, open, views};
 
-/// The pages of all changes, frame by frame, without the first frame.
+/// The pages of all changes, frame by frame. The first frame unfolds the first view, and is only there to start from.
 struct Trace {
     frames: Vec<Vec<u32>>,
+    /// Bytes of each page.
+    bytes: Vec<u64>,
     pages: usize,
     /// Of the pages, in each tenth frame: those with a node or leaf of the front on them, and those with a node that can
     /// change its status next.
@@ -31,7 +33,7 @@ struct Trace {
 pub fn table() {
     println!(
         "path   mesh      pages  in front %: mean  most   can change %: mean  most   changed on in 60, 600 frames %   \
-         memory   pages %   misses %: LRU  Belady   reads/frame: LRU  Belady"
+         memory   misses %: LRU  Belady   reads/frame: LRU  Belady"
     );
     for (name, (trajectory, mode, rate), pixels) in PATHS {
         let Some((log, _)) = log(name) else { continue };
@@ -47,21 +49,19 @@ pub fn table() {
             format!("{:5.1}  {:5.1}", share(mean), share(counts.iter().copied().max().unwrap_or(0) as f64))
         };
         let recent = [60, 600].map(|frames| share(trace.changed_on_within(frames)));
-        let changes: usize = trace.frames.iter().map(Vec::len).sum();
+        let changes: usize = trace.frames[1..].iter().map(Vec::len).sum();
         for parts in [4, 16] {
-            let places = (bytes / parts / fact(&file, "largest page, bytes")) as usize;
-            let [lru, belady] = [false, true].map(|belady| trace.play(places, belady));
+            let [lru, belady] = [false, true].map(|belady| trace.play(bytes / parts, belady));
             let percent = |misses: usize| 100.0 * misses as f64 / changes.max(1) as f64;
             let frames = trace.frames.len() as f64;
             println!(
                 "{trajectory:.5}  {name:8} {:6}           {}               {}                     {:6.1}  {:6.1}           \
-                 1/{parts:<4}  {:6.1}           {:6.2}  {:6.2}             {:6.2}  {:6.2}",
+                 1/{parts:<4}            {:6.2}  {:6.2}             {:6.2}  {:6.2}",
                 trace.pages,
                 spread(&trace.in_front),
                 spread(&trace.can_change),
                 recent[0],
                 recent[1],
-                share(places as f64),
                 percent(lru.0),
                 percent(belady.0),
                 lru.1 as f64 / frames,
@@ -86,23 +86,22 @@ fn trace(
     let mut active = vec![0_u32; engine.tree().node_limit() as usize];
     let mut now: Vec<NodeId> = Vec::new();
     let mut seen = vec![u32::MAX; pages];
-    let mut trace = Trace { frames: Vec::new(), pages, in_front: Vec::new(), can_change: Vec::new() };
+    let bytes = (0..pages as u32).filter_map(|page| file.page_bytes(page)).collect();
+    let mut trace = Trace { frames: Vec::new(), bytes, pages, in_front: Vec::new(), can_change: Vec::new() };
     for (frame, view) in (1..).zip(views) {
         engine.advance(std::slice::from_ref(view)).expect("the store is fine");
         let before = std::mem::take(&mut now);
         engine.for_each_active(|node| now.push(node));
         now.iter().for_each(|node| {
             let last = std::mem::replace(&mut active[node.index()], frame);
-            if last + 1 != frame && frame > 1 {
+            if last + 1 != frame || frame == 1 {
                 trace.changed(frame, node.0 / slots);
             }
         });
         before.iter().filter(|node| active[node.index()] != frame).for_each(|node| {
             trace.changed(frame, node.0 / slots);
         });
-        if frame > 1 {
-            trace.frames.resize(frame as usize - 1, Vec::new());
-        }
+        trace.frames.resize(frame as usize, Vec::new());
         if frame % 10 == 0 {
             let is_active = |node: NodeId| active[node.index()] == frame;
             let mut count = |mark: u32, f: &dyn Fn(NodeId, &mut dyn FnMut(u32))| {
@@ -141,7 +140,7 @@ fn trace(
 
 impl Trace {
     fn changed(&mut self, frame: u32, page: u32) {
-        self.frames.resize(frame as usize - 1, Vec::new());
+        self.frames.resize(frame as usize, Vec::new());
         if let Some(pages) = self.frames.last_mut() {
             pages.push(page);
         }
@@ -150,7 +149,7 @@ impl Trace {
     /// How many pages, on average over all frames, have been changed on within so many frames.
     fn changed_on_within(&self, frames: usize) -> f64 {
         let (mut last, mut sum) = (vec![usize::MAX; self.pages], 0_usize);
-        for (at, changes) in self.frames.iter().enumerate() {
+        for (at, changes) in self.frames.iter().enumerate().skip(1) {
             for &page in changes {
                 // From its last change on, a page counts for so many frames.
                 let since = at.saturating_sub(last[page as usize].min(at));
@@ -161,8 +160,8 @@ impl Trace {
         sum as f64 / self.frames.len().max(1) as f64
     }
 
-    /// Changes that miss, and reads, with so many places.
-    fn play(&self, places: usize, belady: bool) -> (usize, usize) {
+    /// Changes that miss, and reads, with room for so many bytes.
+    fn play(&self, room: u64, belady: bool) -> (usize, usize) {
         // When each page is used next, for each of its uses: from the last frame backwards.
         let mut next_use = vec![usize::MAX; self.pages];
         let mut next: Vec<Vec<usize>> = vec![Vec::new(); self.frames.len()];
@@ -173,19 +172,22 @@ impl Trace {
         // Pages that are there, by what decides: the least goes first.
         let mut rank: Vec<Option<usize>> = vec![None; self.pages];
         let mut there: BTreeSet<(usize, u32)> = BTreeSet::new();
-        let (mut misses, mut reads) = (0, 0);
+        let (mut misses, mut reads, mut used) = (0, 0, 0);
         for (at, changes) in self.frames.iter().enumerate() {
-            misses += changes.iter().filter(|&&page| rank[page as usize].is_none()).count();
+            let missing = changes.iter().filter(|&&page| rank[page as usize].is_none()).count();
+            misses += if at == 0 { 0 } else { missing };
             for (&page, &next) in changes.iter().zip(&next[at]) {
                 let new = if belady { usize::MAX - next } else { at };
                 match rank[page as usize].replace(new) {
                     Some(old) => drop(there.remove(&(old, page))),
                     None => {
-                        reads += 1;
-                        if there.len() == places
+                        reads += usize::from(at > 0);
+                        used += self.bytes[page as usize];
+                        while used > room
                             && let Some((_, gone)) = there.pop_first()
                         {
                             rank[gone as usize] = None;
+                            used -= self.bytes[gone as usize];
                         }
                     }
                 }

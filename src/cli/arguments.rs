@@ -47,7 +47,7 @@ pub(super) enum Command {
 
 #[derive(Debug, Args)]
 pub(super) struct Build {
-    /// Mesh files (.obj .ply .stl .off), heights (.hgt, several are one mosaic; .png .tif), or scene:NAME.
+    /// Mesh files (.obj .ply .stl .off), heights (.hgt or .zip of them, several are one mosaic; .png .tif), or scene:NAME.
     #[arg(required = true)]
     pub input: Vec<String>,
     /// How the hierarchy will be stored.
@@ -64,6 +64,9 @@ pub(super) struct Build {
     /// Memory to build within, such as 256M, for meshes that are larger; the rest is kept in temporary files.
     #[arg(long, value_name = "SIZE", value_parser = size)]
     pub memory: Option<u64>,
+    /// Threads that share this memory, 1 to 4; the result does not depend on it [default: one a core].
+    #[arg(long, value_name = "N", requires = "memory", value_parser = clap::value_parser!(u8).range(1..=4))]
+    pub threads: Option<u8>,
     /// Folder for temporary files [default: that of the output].
     #[arg(long, value_name = "DIR", requires = "memory")]
     pub temp: Option<PathBuf>,
@@ -130,6 +133,9 @@ pub(super) struct Refinement {
     /// What is compared with the tolerance.
     #[arg(long, value_enum, default_value = "error")]
     pub criterion: CriterionName,
+    /// Leave coarse what is seen from behind (detail-block; others have no cones of normals).
+    #[arg(long)]
+    pub normal_cone: bool,
     /// Tolerance as a share of half the image's height.
     #[arg(long, value_parser = positive, conflicts_with = "pixels")]
     pub theta: Option<f64>,

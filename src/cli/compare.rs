@@ -189,6 +189,7 @@ fn options(command: &Compare) -> Options {
     Options {
         strategies,
         criterion: command.refinement.criterion.into(),
+        normal_cone: command.refinement.normal_cone,
         theta: command.refinement.theta(),
         budget,
         work_cap: command.work_cap.unwrap_or_default(),

@@ -17,7 +17,12 @@ use crate::store::BuildOptions;
 use crate::view::Camera;
 
 fn options(refinement: &Refinement) -> Options {
-    Options { criterion: refinement.criterion.into(), theta: refinement.theta(), ..Options::default() }
+    Options {
+        criterion: refinement.criterion.into(),
+        normal_cone: refinement.normal_cone,
+        theta: refinement.theta(),
+        ..Options::default()
+    }
 }
 
 fn check_frame(path: &Path, frame: usize) -> Result<()> {

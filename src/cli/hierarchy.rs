@@ -1,12 +1,12 @@
 //! `build`, `info` and `verify`.
 
 use std::fmt::Write;
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 use std::sync::atomic::{AtomicBool, Ordering};
 
 use anyhow::{Context, Result};
 use serde_json::json;
-use vertex_tree::{CollapseLog, read_log};
+use vertex_tree::{CollapseLog, LogFile, read_log};
 
 use super::arguments::{Build, Info, Verify};
 use super::input::Input;
@@ -15,19 +15,22 @@ use super::progress::stage;
 use crate::mesh_io::{self, ReadOptions, Receiver};
 use crate::progress::Progress;
 use crate::simplify;
-use crate::store::{self, Backend, BuildOptions, Store};
+use crate::store::{self, Backend, BuildOptions, Store, WriteLimits};
 
 pub(super) fn build(command: &Build) -> Result<()> {
     let input = Input::one(&command.input)?;
     super::check_writable(&command.output)?;
-    if let (Some(memory), Input::Meshes(files)) = (command.memory, &input) {
-        anyhow::ensure!(
-            command.backend == Backend::InMemory,
-            "--memory builds for in-memory as yet: files of {} are written from a log that is in memory",
-            command.backend.name()
-        );
-        let report = build_within(&input.name(), files, memory, command)?;
-        return print(&describe(&report));
+    if let Some(memory) = command.memory {
+        return match &input {
+            Input::Meshes(files) => print(&describe(&build_within(&input.name(), files, memory, command)?)),
+            Input::Log(file) => {
+                let log = LogFile::open(file)?;
+                let limits = write_limits(memory, command)?;
+                write_within(&input.name(), &log, command, &limits)
+            }
+            Input::Scene(scene) => anyhow::bail!("--memory builds from files, and {scene} is made in memory"),
+            Input::Stored(_) => input.log(false).map(|_| ()),
+        };
     }
     let (log, report) = input.log(command.merge_components)?;
     let options = BuildOptions::from(&command.storage);
@@ -40,8 +43,8 @@ pub(super) fn build(command: &Build) -> Result<()> {
     Ok(())
 }
 
-/// Builds the log of a mesh that may be larger than memory.
-fn build_within(name: &str, files: &[PathBuf], memory: u64, command: &Build) -> Result<simplify::Report> {
+/// What `--memory` allows. From now on an interrupt is an error like any other.
+fn write_limits(memory: u64, command: &Build) -> Result<WriteLimits<'static>> {
     static STOP: AtomicBool = AtomicBool::new(false);
     // Whoever does not want to wait for the temporary files to go asks twice.
     ctrlc::set_handler(|| {
@@ -49,20 +52,56 @@ fn build_within(name: &str, files: &[PathBuf], memory: u64, command: &Build) -> 
             std::process::exit(130);
         }
     })?;
-    let folder = match (&command.temp, command.output.parent()) {
+    let temporary = match (&command.temp, command.output.parent()) {
         (Some(folder), _) => folder.clone(),
         (None, Some(parent)) if !parent.as_os_str().is_empty() => parent.to_owned(),
         _ => PathBuf::from("."),
     };
-    let options = simplify::Options { merge_components: command.merge_components };
-    let expected_triangles = mesh_io::expected_triangles(files);
-    let limits = simplify::Limits { memory, temporary: folder.clone(), expected_triangles, stop: &STOP };
-    let report = stage(&format!("{name}: building the hierarchy"), |p| {
-        let read = |receiver: &mut dyn Receiver, progress: Progress<'_>| {
-            mesh_io::send(files, &ReadOptions::default(), &folder, receiver, progress)
-        };
-        simplify::build_within(read, &command.output, &options, &limits, p)
+    Ok(WriteLimits { memory, temporary, stop: &STOP })
+}
+
+/// Writes the hierarchy of a log that may be larger than memory.
+fn write_within(name: &str, log: &LogFile, command: &Build, limits: &WriteLimits<'_>) -> Result<()> {
+    let options = BuildOptions::from(&command.storage);
+    stage(&format!("{name}: writing"), |_| {
+        store::write_within(command.backend, &command.output, log, &options, limits)
     })?;
+    Ok(())
+}
+
+/// Builds the hierarchy of a mesh that may be larger than memory.
+fn build_within(name: &str, files: &[PathBuf], memory: u64, command: &Build) -> Result<simplify::Report> {
+    let limits = write_limits(memory, command)?;
+    let expected_triangles = mesh_io::expected_triangles(files);
+    // Where that is not known, it will be seen. Meshes have half as many vertices as triangles.
+    limits.check(command.backend, expected_triangles / 2, expected_triangles)?;
+    let folder = &limits.temporary;
+    let options = simplify::Options { merge_components: command.merge_components };
+    let cores = || std::thread::available_parallelism().map_or(1, usize::from).min(simplify::MOST_THREADS);
+    let threads = command.threads.map_or_else(cores, usize::from);
+    let own = simplify::Limits {
+        memory,
+        temporary: folder.clone(),
+        threads,
+        expected_triangles,
+        stop: limits.stop,
+    };
+    let build = |output: &Path| {
+        stage(&format!("{name}: building the hierarchy"), |p| {
+            let read = |receiver: &mut dyn Receiver, progress: Progress<'_>| {
+                mesh_io::send(files, &ReadOptions::default(), folder, receiver, progress)
+            };
+            simplify::build_within(read, output, &options, &own, p)
+        })
+    };
+    if command.backend == Backend::InMemory {
+        return Ok(build(&command.output)?);
+    }
+    // The backend's file is written from the log, which nobody has asked for.
+    let log = tempfile::Builder::new().prefix(".foldfront-").tempfile_in(folder);
+    let log = log.with_context(|| format!("temporary files in {}", folder.display()))?.into_temp_path();
+    let report = build(&log)?;
+    write_within(name, &LogFile::open(&log)?, command, &limits)?;
     Ok(report)
 }
 

@@ -207,6 +207,7 @@ impl Input {
     }
 }
 
+/// Whether a file is a tile of heights, or an archive of them.
 fn is_tile(path: &Path) -> bool {
-    path.extension().is_some_and(|e| e.eq_ignore_ascii_case("hgt"))
+    path.extension().is_some_and(|e| e.eq_ignore_ascii_case("hgt") || e.eq_ignore_ascii_case("zip"))
 }

@@ -267,7 +267,7 @@ impl<T: VertexTree, M: MeshSink, F: Watch> Steps<'_, T, M, F> {
 
     fn wanted(&mut self, slot: Slot) -> bool {
         self.tests += 1;
-        self.frame.unfold(&self.front.record(slot).bounds)
+        self.frame.unfold(slot, &self.front.record(slot).bounds)
     }
 
     fn watch(&mut self, slot: Slot, kind: Kind) {
@@ -312,7 +312,7 @@ impl<T: VertexTree, M: MeshSink, F: Watch> Steps<'_, T, M, F> {
             let record = self.front.record(parent);
             if record.is_collapsible() {
                 self.tests += 1;
-                if self.frame.unfold(&record.bounds) {
+                if self.frame.unfold(parent, &record.bounds) {
                     self.finder.watch(self.frame, parent, Kind::Fold, record.bounds);
                 } else {
                     self.folding.push((parent, record.node));
@@ -403,6 +403,11 @@ impl<T: VertexTree, M: MeshSink, F: Watch> Steps<'_, T, M, F> {
             }
         }
         self.front.set_active(self.tree, slot);
+        if let Some(cones) = self.frame.cones {
+            for child in self.front.children(self.tree, slot) {
+                cones.set(child, self.tree.normal_cone(self.front.node(child)));
+            }
+        }
         self.watch(slot, Kind::Fold);
         let (front, frame) = (&*self.front, self.frame);
         let mut comes_into_play = |slot: Slot, record: &Record, wanted: bool| {
@@ -418,7 +423,7 @@ impl<T: VertexTree, M: MeshSink, F: Watch> Steps<'_, T, M, F> {
         {
             // The rule, and worth tests two at a time.
             let [a, b] = children.map(|child| front.record(child));
-            let wanted = frame.unfold_both([&a.bounds, &b.bounds]);
+            let wanted = frame.unfold_both(children, [&a.bounds, &b.bounds]);
             comes_into_play(children[0], a, wanted[0]);
             comes_into_play(children[1], b, wanted[1]);
             return;
@@ -426,7 +431,7 @@ impl<T: VertexTree, M: MeshSink, F: Watch> Steps<'_, T, M, F> {
         for child in front.children(self.tree, slot) {
             let record = front.record(child);
             if T::IS_TREE || record.is_boundary() {
-                comes_into_play(child, record, frame.unfold(&record.bounds));
+                comes_into_play(child, record, frame.unfold(child, &record.bounds));
             }
         }
     }

@@ -262,12 +262,9 @@ impl Bench<'_> {
     /// Tests one event in f64.
     fn test(&self, event: &Event, queue: &mut OnClock, flip: &mut impl FnMut(&Event, &mut OnClock)) {
         let Self { frame, course, .. } = self;
-        let frames = match event.kind() {
-            Kind::Unfold => frame.criterion.earliest_unfold(frame.views, course, &event.bounds),
-            Kind::Fold => frame.criterion.earliest_fold(frame.views, course, &event.bounds),
-        };
+        let frames = frame.earliest(course, event.slot, event.kind(), &event.bounds);
         // A positive bound says that nothing can have changed yet; only then is the predicate spared.
-        if frames == 0.0 && frame.unfold(&event.bounds) == (event.kind() == Kind::Unfold) {
+        if frames == 0.0 && frame.unfold(event.slot, &event.bounds) == (event.kind() == Kind::Unfold) {
             flip(event, queue);
         } else {
             queue.schedule(frames, *event);
@@ -318,7 +315,9 @@ fn process(
             frames.map(|frames| (frames * TICKS_PER_FRAME as f32).min(HORIZON as f32 / 2.0) as i32 as u32);
         let mut queue = queue.on(bench.clock);
         for (lane, event) in batch.events[..batch.count].iter().enumerate() {
-            if frames[lane % LANES] > 0.0 {
+            // The filter knows of no cones: they can make a fold earlier, not an unfold.
+            let is_valid = bench.frame.cones.is_none() || event.kind() == Kind::Unfold;
+            if is_valid && frames[lane % LANES] > 0.0 {
                 queue.schedule_ticks(ticks[lane % LANES], *event);
             } else {
                 bench.test(event, &mut queue, &mut flip);

@@ -78,13 +78,16 @@ fn scan(packed: &Packed, kind: Kind, lenses: Option<&[Lens]>, frame: &Frame, fli
             // A boundary node flips unless it is certainly not wanted, a collapsible one unless it certainly is.
             Some(lenses) => match kind {
                 Kind::Unfold => doubtful(&certainly::<false>(block, lenses), used),
+                // The filter knows of no cones: what it is certain of may be seen from behind.
+                Kind::Fold if frame.cones.is_some() => (1 << used) - 1,
                 Kind::Fold => doubtful(&certainly::<true>(block, lenses), used),
             },
             None => (1 << used) - 1,
         };
         for_each_bit(mask, |lane| {
-            if frame.unfold(&block.bounds(lane)) == (kind == Kind::Unfold) {
-                flips.push(Slot(block.tag[lane]));
+            let slot = Slot(block.tag[lane]);
+            if frame.unfold(slot, &block.bounds(lane)) == (kind == Kind::Unfold) {
+                flips.push(slot);
             }
         });
     }

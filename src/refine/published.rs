@@ -59,7 +59,7 @@ impl Published {
         flips.tests += due.len() as u64;
         for entry in &due {
             let bounds = front.bounds(entry.slot);
-            if frame.unfold(&bounds) == (entry.kind == Kind::Unfold) {
+            if frame.unfold(entry.slot, &bounds) == (entry.kind == Kind::Unfold) {
                 match entry.kind {
                     Kind::Unfold => flips.unfold.push(entry.slot),
                     Kind::Fold => flips.fold.push(entry.slot),

@@ -18,13 +18,15 @@ impl TopDown {
     pub fn find(&mut self, frame: &Frame, front: &Front, flips: &mut Flips) {
         // One view is the rule, and worth a loop without a loop in it.
         match frame.views {
-            [view] => self.walk(front, flips, |bounds| frame.criterion.unfold_for(view, bounds)),
-            _ => self.walk(front, flips, |bounds| frame.unfold(bounds)),
+            [view] if frame.cones.is_none() => {
+                self.walk(front, flips, |_, bounds| frame.criterion.unfold_for(view, bounds));
+            }
+            _ => self.walk(front, flips, |slot, bounds| frame.unfold(slot, bounds)),
         }
     }
 
     #[inline(always)]
-    fn walk(&mut self, front: &Front, flips: &mut Flips, unfold: impl Fn(&Bounds) -> bool) {
+    fn walk(&mut self, front: &Front, flips: &mut Flips, unfold: impl Fn(Slot, &Bounds) -> bool) {
         self.stack.clear();
         self.stack.extend_from_slice(front.root_pairs());
         while let Some(pair) = self.stack.pop() {
@@ -34,15 +36,16 @@ impl TopDown {
                 }
                 flips.tests += 1;
                 front.descend(record, &mut self.stack);
-                let (wanted, active) = (unfold(&record.bounds), record.is_active());
+                let slot = Slot(2 * pair + side);
+                let (wanted, active) = (unfold(slot, &record.bounds), record.is_active());
                 if wanted != active {
                     if wanted {
                         if record.is_boundary() {
-                            flips.unfold.push(Slot(2 * pair + side));
+                            flips.unfold.push(slot);
                         }
                     } else if record.is_collapsible() {
                         // The rest of a subtree that has to go follows from its lowest nodes upwards.
-                        flips.fold.push(Slot(2 * pair + side));
+                        flips.fold.push(slot);
                     }
                 }
             }

@@ -26,15 +26,17 @@
 //! Bounds must be nested over all that a collapse depends on: the nodes at its vertices and the creators of its
 //! triangles. A block has a table of the nodes that its vertices and triangles refer to, so they are always there.
 //!
-//! Everything runs on the thread that calls.
+//! Blocks come up in an order (`order`) in which parts of the mesh have nothing to do with each other until the blocks on
+//! their borders come up, so several threads work on a pass, each in a window of its own (`pass`), and the result does not
+//! depend on how many there are. Where records are sorted before the passes, each half of a run is sorted by a thread.
+//! Everything else runs on the thread that calls.
 
 mod blocks;
 mod log;
 mod parts;
+mod pass;
 mod passes;
 mod prepare;
-mod scratch;
-mod sort;
 mod store;
 mod window;
 
@@ -43,6 +45,7 @@ use std::path::{Path, PathBuf};
 use std::sync::atomic::AtomicBool;
 use std::time::Instant;
 
+use vertex_tree::external::Scratch;
 use vertex_tree::{Bounds, Collapse, LogCounts, LogError, LogFileError, NONE, write_log_from};
 
 use super::key_counts::KeyCounts;
@@ -52,7 +55,6 @@ use crate::progress::Progress;
 use log::Log;
 use passes::{FIRST_PARITY, Interrupted, Passes};
 use prepare::Input;
-use scratch::Scratch;
 use window::Whole;
 
 /// What a construction may take.
@@ -63,11 +65,17 @@ pub struct Limits<'a> {
     pub memory: u64,
     /// Where temporary files are made.
     pub temporary: PathBuf,
+    /// How many threads may work at the same time, at least 1 and at most [`MOST_THREADS`]. They share the memory. The
+    /// result does not depend on it.
+    pub threads: usize,
     /// About how many triangles there will be, to see before they are read whether there is room; 0 where nobody knows.
     pub expected_triangles: u64,
     /// Set by whoever wants the construction to end: it fails with [`OutOfCoreError::Interrupted`] soon afterwards.
     pub stop: &'a AtomicBool,
 }
+
+/// More threads than this would find nothing to do.
+pub const MOST_THREADS: usize = super::order::PARTS as usize;
 
 /// Less memory than this can not be asked for.
 pub const LEAST_MEMORY: u64 = 1 << 16;
@@ -158,7 +166,6 @@ pub fn build_within(
         scale: input.scale(),
         extent: input.extent(),
         live_triangles,
-        next_id: 0,
         first_id: 0,
         parity: FIRST_PARITY,
         merge: false,
@@ -166,19 +173,21 @@ pub fn build_within(
     let mut passes = Passes {
         blocks,
         whole,
+        next_id: 0,
         stop: limits.stop,
+        threads: limits.threads.max(1),
         window_bytes: memory - memory / 8,
         sort_bytes: (memory / 32) as usize,
         log: Log::new(&scratch).map_err(temporary)?,
         scratch,
         merge_components: options.merge_components,
+        numbers: vertices as u32,
         all: 0,
         live: 0,
         counts: KeyCounts::default(),
         windows: 0,
         loaded: 0,
         roots: 0,
-        rings: Vec::new(),
     };
     passes.begin().map_err(temporary)?;
     let preparation = start.elapsed();

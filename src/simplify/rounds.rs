@@ -9,9 +9,9 @@
 //! out to be more than this round's limit, the candidate waits with the measured key. A node that has a large error
 //! early spoils all that depend on it: taking the forecast for granted costs a third more triangles at equal error.
 //!
-//! A round goes through the mesh block by block, in ascending order of keys inside each. Blocks are as large as the
-//! caches, and borders between them are few. The result is sorted by key afterwards: collapses of a round may be put
-//! in any order.
+//! A round goes through the mesh block by block, in ascending order of keys inside each; in which order, `order` says.
+//! Blocks are as large as the caches, and borders between them are few. The result is sorted by key afterwards: collapses
+//! of a round may be put in any order.
 
 use std::ops::Range;
 
@@ -22,11 +22,10 @@ use super::key_counts::KeyCounts;
 use super::legality::is_legal;
 use super::marks::Marks;
 use super::nodes::{Nodes, round_up};
+use super::order::{self, PIECES};
 use super::samples::Samples;
 use super::surface::{Spoke, Surface};
 
-/// Vertices of a block at the start.
-pub(super) const BLOCK: usize = 2048;
 /// How a measured distance counts against keys that are not measured: with this times its square. Keys are mean squared
 /// distances, less than the square of the largest. With 1, only the worst surprises are put off, at the cost of 7 %
 /// more measurements, and cuts of scans have 15 % fewer triangles than without measuring first; with 2 it is 50 % and
@@ -84,11 +83,13 @@ impl Builder {
         }
     }
 
-    /// Collapses until nothing legal is left. At the start there were `all` vertices, and `number` says which one of them
-    /// each is. `after_round` is called with the nodes of each round and the key up to which candidates were taken up.
+    /// Collapses until nothing legal is left. At the start `all` vertices had a triangle; numbers are below `numbers`, and
+    /// `number` says which one each vertex has. `after_round` is called with the nodes of each round and the key up to
+    /// which candidates were taken up.
     pub fn run<E>(
         &mut self,
         all: usize,
+        numbers: u32,
         number: impl Fn(u32) -> u32,
         mut after_round: impl FnMut(&Builder, Range<u32>, f32) -> Result<(), E>,
     ) -> Result<(), E> {
@@ -102,7 +103,7 @@ impl Builder {
             }
             if let Some(limit) = self.key_limit() {
                 let first = self.nodes.next();
-                self.run_round(limit, all, &number, 0..self.surface.live.len());
+                self.run_round(limit, all, numbers, &number);
                 if self.nodes.next() > first {
                     self.surface.rebuild_stars();
                     after_round(self, first..self.nodes.next(), limit)?;
@@ -120,17 +121,35 @@ impl Builder {
         }
     }
 
-    /// A round over the vertices `live[range]`; for the others see [`run`](Self::run). Stars have to be rebuilt afterwards
-    /// if there are new nodes.
-    pub fn run_round(&mut self, limit: f32, all: usize, number: impl Fn(u32) -> u32, range: Range<usize>) {
+    /// A round; see [`run`](Self::run). Stars have to be rebuilt afterwards if there are new nodes.
+    fn run_round(&mut self, limit: f32, all: usize, numbers: u32, number: impl Fn(u32) -> u32) {
         let first_id = self.nodes.next_id;
-        let width = block_width(all, self.surface.live.len());
-        let mut start = range.start;
-        while start < range.end {
-            let block = |i: usize| number(self.surface.live[i]) / width;
-            let end = (start..range.end).find(|&i| block(i) != block(start)).unwrap_or(range.end);
-            self.run_block(limit, first_id, start..end);
-            start = end;
+        let shift = order::span(all, self.surface.live.len()).ilog2();
+        let piece = |v: u32| number(v) >> shift;
+        let mut pairs: Vec<[u32; 2]> = Vec::new();
+        for triangle in &self.surface.triangles {
+            let [a, b, c] = triangle.corners.map(piece);
+            for pair in [[a, b], [b, c], [c, a]] {
+                if pair[0] != pair[1] && pairs.last() != Some(&pair) {
+                    pairs.push(pair);
+                }
+            }
+        }
+        let pieces = numbers.saturating_sub(1) >> shift;
+        let borders = order::borders(pieces + 1, |pair| pairs.iter().for_each(|&[a, b]| pair(a, b)));
+        drop(pairs);
+        let all_live = self.surface.live.len();
+        for are_on_borders in [false, true] {
+            let mut start = 0;
+            while start < all_live {
+                let block = |i: usize| piece(self.surface.live[i]) / PIECES;
+                let this = block(start);
+                let end = (start..all_live).find(|&i| block(i) != this).unwrap_or(all_live);
+                if borders[this as usize] == are_on_borders {
+                    self.run_block(limit, first_id, start..end);
+                }
+                start = end;
+            }
         }
         self.candidates.parity = self.candidates.parity.other();
     }
@@ -378,12 +397,6 @@ impl Builder {
 
 /// Times the average distance of vertices: beyond this, no pair is left to be found.
 const FARTHEST_REACH: f32 = 1e6;
-
-/// Numbers of vertices in a block, of which between a half and all are there: blocks widen as vertices grow fewer.
-pub(super) fn block_width(all: usize, live: usize) -> u32 {
-    let halvings = (all / live.max(1)).max(1).ilog2();
-    (BLOCK as u32).checked_shl(halvings).filter(|width| width >> halvings == BLOCK as u32).unwrap_or(u32::MAX)
-}
 
 /// Adds the special edges that remain around a special vertex, whose star is given, once it has merged into `u`.
 fn add_special_edges(u: u32, star: &[Spoke], surface: &Surface, samples: &mut Samples, marks: &mut Marks) {

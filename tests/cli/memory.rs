@@ -37,6 +37,33 @@ fn the_file_is_the_same_whatever_the_memory() {
     assert!(place.names("temp").is_empty());
 }
 
+/// Meta-nodes are written within the memory too; the others need it all, and say how much where there is less.
+#[test]
+fn files_of_backends_are_the_same_whatever_the_memory() {
+    let place = with_large(60);
+    std::fs::create_dir(place.file("temp")).unwrap();
+    place.succeed("build large.ply -o large.log");
+    for (backend, memory) in
+        [("in-memory", "64K"), ("meta-node", "64K"), ("detail-block", "2M"), ("mt-partition", "2M")]
+    {
+        place.succeed(&format!("build large.ply -o whole.fold --backend {backend}"));
+        let whole = place.read("whole.fold");
+        for input in ["large.ply --threads 1", "large.ply --threads 3", "large.log"] {
+            let options = format!("--backend {backend} --memory {memory} --temp temp");
+            place.succeed(&format!("build {input} -o pieces.fold {options}"));
+            assert!(place.read("pieces.fold") == whole, "{input} for {backend}");
+        }
+        if !matches!(backend, "in-memory" | "meta-node") {
+            for input in ["large.ply", "large.log"] {
+                let build = format!("build {input} -o out.fold --backend {backend} --memory 64K");
+                place.fail(&build, 1, &[backend, "are needed for", "0 MB are allowed"]);
+            }
+        }
+    }
+    assert!(place.names("temp").is_empty());
+    place.fail("build scene:city -o out.log --memory 1G", 1, &["scene:city is made in memory"]);
+}
+
 #[test]
 fn what_is_wrong_with_the_input_or_the_options_is_said() {
     let place = Workplace::new();
@@ -50,6 +77,7 @@ fn what_is_wrong_with_the_input_or_the_options_is_said() {
         place.fail(&format!("build grid.ply -o out.log --memory={size}"), 2, &["--memory", size]);
     }
     place.fail("build grid.ply -o out.log --temp .", 2, &["--memory"]);
+    place.fail("build grid.ply -o out.log --memory 1M --threads 5", 2, &["--threads", "5"]);
 }
 
 /// A limit on the length of files stands in for a full disk: writing fails in the same way.

@@ -59,9 +59,10 @@ const BACKENDS: [(&str, Open); 6] = [
         let own = |settings| OwnGraph { engine: engine(settings), cut: cut.clone() };
         settings.iter().map(|settings| Box::new(own(settings)) as Box<dyn Follower>).collect()
     }),
-    // As in the paper, where frames wait for blocks; and quantised, by an I/O thread that is waited for.
-    ("detail-block", |log, settings| detail::follow(log, settings, false)),
-    ("detail-block quantised", |log, settings| detail::follow(log, settings, true)),
+    // As in the paper, where frames wait for blocks; and quantised, by an I/O thread that is waited for, with the
+    // normal-cone test.
+    ("detail-block", |log, settings| detail::follow(log, settings, false, false)),
+    ("detail-block quantised, normal cone", |log, settings| detail::follow(log, settings, true, true)),
 ];
 
 /// The hierarchy as a file of meta-nodes, kept in memory.

@@ -99,13 +99,27 @@ struct Own {
 }
 
 /// Trees over one file, one for each of the settings.
-pub fn follow(log: &CollapseLog, settings: &[Settings], quantize: bool) -> Vec<Box<dyn Follower>> {
+pub fn follow(
+    log: &CollapseLog,
+    settings: &[Settings],
+    quantize: bool,
+    normal_cone: bool,
+) -> Vec<Box<dyn Follower>> {
     let arrangement = Arrangement::new(log, &options(quantize, true)).unwrap();
     let file = file(&arrangement);
-    let cut = Rc::new(RefCell::new(OwnCut::new(&arrangement.effective_log())));
+    let mut cut = OwnCut::new(&arrangement.effective_log());
+    if normal_cone {
+        cut.oracle = cut.oracle.with_cones(arrangement.cones());
+    }
+    let cut = Rc::new(RefCell::new(cut));
     let how = reading(if quantize { Io::Background } else { Io::Blocking });
     let own = |&settings: &Settings| Own {
-        engine: Engine::new(XfmTree::new(file.clone(), how).unwrap(), NullSink, settings).unwrap(),
+        engine: Engine::new(
+            XfmTree::new(file.clone(), how).unwrap(),
+            NullSink,
+            Settings { normal_cone, ..settings },
+        )
+        .unwrap(),
         cut: cut.clone(),
     };
     settings.iter().map(|settings| Box::new(own(settings)) as Box<dyn Follower>).collect()

@@ -2,6 +2,7 @@
 
 #[path = "../common/mod.rs"]
 mod common;
+mod cones;
 mod paging;
 
 use std::collections::HashSet;

@@ -20,13 +20,17 @@ fn send(mesh: &Mesh, receiver: &mut dyn Receiver) -> Result<(), MeshIoError> {
 }
 
 fn limits<'a>(memory: u64, folder: &Path, stop: &'a AtomicBool) -> Limits<'a> {
-    Limits { memory, temporary: folder.to_owned(), expected_triangles: 0, stop }
+    Limits { memory, temporary: folder.to_owned(), threads: 2, expected_triangles: 0, stop }
 }
 
 fn build(mesh: &Mesh, merge: bool, memory: u64) -> (CollapseLog, Report) {
+    build_with(mesh, merge, memory, 2)
+}
+
+fn build_with(mesh: &Mesh, merge: bool, memory: u64, threads: usize) -> (CollapseLog, Report) {
     let folder = tempfile::tempdir().unwrap();
     let (file, stop) = (folder.path().join("log"), AtomicBool::new(false));
-    let limits = limits(memory, folder.path(), &stop);
+    let limits = Limits { threads, ..limits(memory, folder.path(), &stop) };
     let mut last = 0;
     let progress = &mut |done, all| {
         assert!(last <= done && done <= all);
@@ -43,16 +47,26 @@ fn names(folder: &Path) -> Vec<String> {
 
 /// The log, and all of the report but times, are those of the construction in memory.
 fn assert_same(mesh: &Mesh, merge: bool, memory: u64) -> Report {
-    let (expected, in_memory) = simplify(mesh, merge);
-    let (log, report) = build(mesh, merge, memory);
-    assert!(log == expected, "another log within {memory} bytes");
+    let in_memory = simplify(mesh, merge);
+    assert_same_as(&in_memory, mesh, merge, memory, 2)
+}
+
+fn assert_same_as(
+    (expected, in_memory): &(CollapseLog, Report),
+    mesh: &Mesh,
+    merge: bool,
+    memory: u64,
+    threads: usize,
+) -> Report {
+    let (log, report) = build_with(mesh, merge, memory, threads);
+    assert!(log == *expected, "another log within {memory} bytes, with {threads} threads");
     let facts = |r: &Report| {
         (
             (r.triangles, r.collapses, r.rounds.clone(), r.roots, r.tree_depth),
             (r.dependency_depth, r.base_triangles, r.largest_eps, r.inversions),
         )
     };
-    assert_eq!(facts(&report), facts(&in_memory));
+    assert_eq!(facts(&report), facts(in_memory));
     report
 }
 
@@ -72,6 +86,16 @@ fn the_result_does_not_depend_on_the_memory() {
     let Some(mesh) = data::mesh("meshes/bunny.ply") else { return };
     let windows = [LEAST_MEMORY, 1 << 20, 4 << 20, 1 << 30].map(|m| assert_same(&mesh, false, m).windows);
     assert!(windows.is_sorted_by(|a, b| a > b), "{windows:?}");
+}
+
+#[test]
+fn the_result_does_not_depend_on_the_number_of_threads() {
+    let Some(mesh) = data::mesh("meshes/lucy_100k.ply") else { return };
+    let in_memory = simplify(&mesh, false);
+    for threads in [1, 2, 3, 4] {
+        let report = assert_same_as(&in_memory, &mesh, false, 1 << 20, threads);
+        assert!(report.windows > 100, "{report:?}");
+    }
 }
 
 #[test]

@@ -9,7 +9,7 @@
 
 use std::path::Path;
 
-use vertex_tree::{Collapse, CollapseLog, Mesh, NONE};
+use vertex_tree::{Collapse, CollapseLog, Mesh, NONE, NormalCone};
 
 use crate::error::XfmError;
 use crate::format::{Header, OFFSET_BITS};
@@ -234,6 +234,21 @@ impl Arrangement {
             Collapse { removed: merge.removed, kept: merge.kept, bounds }
         };
         CollapseLog { mesh: self.mesh.clone(), collapses: order.iter().map(collapse).collect() }
+    }
+
+    /// For each collapse of [`effective_log`](Self::effective_log), the cone of normals that the file knows: roots have
+    /// none.
+    #[must_use]
+    pub fn cones(&self) -> Vec<NormalCone> {
+        let mut order: Vec<u32> = (0..self.replay.merges.len() as u32).collect();
+        order.sort_unstable_by_key(|&n| std::cmp::Reverse(self.layout.node_of[n as usize]));
+        let mut cones: Vec<_> = order.iter().map(|&n| self.nesting.cone(n)).collect();
+        for root in self.replay.roots() {
+            let place = order
+                .partition_point(|&n| self.layout.node_of[n as usize] > self.layout.node_of[root as usize]);
+            cones[place] = NormalCone::NONE;
+        }
+        cones
     }
 
     /// For each collapse of [`effective_log`](Self::effective_log), those that its split needs beyond the tree:

@@ -3,6 +3,8 @@
 //! Angles are kept as cosine and sine, so that they are added and compared without trigonometry. From 90 degrees on a cone
 //! says nothing about which side is seen.
 
+use vertex_tree::NormalCone;
+
 use crate::node::NO_CONE;
 use crate::vector::{self, Vector};
 
@@ -28,6 +30,15 @@ pub(crate) fn sum(a: Angle, b: Angle) -> Angle {
 pub(crate) fn larger(a: Angle, b: Angle) -> Angle {
     let (a, b) = (a?, b?);
     Some(if a.0 <= b.0 { a } else { b })
+}
+
+/// Whether a stored cone is within another. Rounding takes less than half of the room that
+/// [`stored_sine`] leaves.
+pub(crate) fn is_nested(inner: &NormalCone, outer: &NormalCone) -> bool {
+    let Some((_, most)) = of_sine(outer.sine) else { return true };
+    let [a, b] = [outer, inner].map(|cone| vector::unit(vector::of(cone.axis)));
+    let apart = a.zip(b).and_then(|(a, b)| between(a, b));
+    sum(apart, of_sine(inner.sine)).is_some_and(|(_, sine)| sine + 5e-7 <= most)
 }
 
 /// The sine to be stored for an angle, with room for rounding: never too small.

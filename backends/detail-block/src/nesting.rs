@@ -16,7 +16,7 @@
 //! the normal cone: `angle(axis_n, axis_m) + angle_m <= angle_n`. A leaf counts with the farthest corner, and the most
 //! deviating normal, of its triangles.
 
-use vertex_tree::{Bounds, NONE};
+use vertex_tree::{Bounds, NONE, NormalCone};
 
 use crate::cone::{self, Angle};
 use crate::half_edges::{Adjacent, BOUNDARY};
@@ -152,6 +152,11 @@ impl Nesting {
         self.axes.push(self.normals[v]);
         self.record(step, node);
         Ok(())
+    }
+
+    /// The cone of normals of a node.
+    pub fn cone(&self, node: u32) -> NormalCone {
+        NormalCone { axis: self.axes[node as usize], sine: self.sines[node as usize] }
     }
 
     fn find_predecessors(&mut self, step: &Step<'_>) {

@@ -17,7 +17,7 @@
 //! fold-overs; here dependencies do, and eps takes its place. A sine above 1 says that there is no cone: the normals below
 //! the node are spread over half of all directions or more.
 
-use vertex_tree::Bounds;
+use vertex_tree::{Bounds, NormalCone};
 
 use crate::quantize::{self, Scale};
 
@@ -43,6 +43,10 @@ pub(crate) struct Stored {
 impl Stored {
     pub fn bounds(&self) -> Bounds {
         Bounds { center: self.position, radius: self.radius, eps: self.eps }
+    }
+
+    pub fn cone(&self) -> NormalCone {
+        NormalCone { axis: self.normal, sine: self.sine }
     }
 
     /// Whether the numbers are such as a builder writes.

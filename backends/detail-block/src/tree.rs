@@ -13,7 +13,9 @@
 use std::sync::Arc;
 use std::time::Duration;
 
-use vertex_tree::{Bounds, MeshSink, NONE, NodeId, PageStats, Prefetch, Step, TreeError, VertexTree};
+use vertex_tree::{
+    Bounds, MeshSink, NONE, NodeId, NormalCone, PageStats, Prefetch, Step, TreeError, VertexTree,
+};
 
 use crate::block::ACTIVE;
 use crate::error::XfmError;
@@ -80,12 +82,6 @@ impl XfmTree {
         self.paging.counts
     }
 
-    /// Normal and sine of the normal cone of a node whose block is in memory; a sine above 1 is no cone.
-    #[must_use]
-    pub fn normal_cone(&self, node: NodeId) -> Option<([f32; 3], f32)> {
-        self.paging.node(node).map(|node| (node.stored.normal, node.stored.sine))
-    }
-
     fn damaged(&self, node: NodeId, reason: &'static str) -> TreeError {
         let file = &self.paging.file;
         let offset = file.place(file.levels().block(node)).0;
@@ -147,6 +143,7 @@ fn brought(adjacent: [u32; 4]) -> u64 {
 
 impl VertexTree for XfmTree {
     const IS_TREE: bool = true;
+    const HAS_CONES: bool = true;
 
     fn node_limit(&self) -> u32 {
         (self.paging.file.header().blocks as u32) << self.paging.file.levels().get()
@@ -169,6 +166,14 @@ impl VertexTree for XfmTree {
         let stub = || self.paging.stub(file.levels().block(node)).map(|stub| stub.bounds);
         let bounds = listed.map_or_else(|_| stub(), |i| Some(file.roots()[i].1));
         bounds.unwrap_or(Bounds { center: [0.0; 3], radius: 0.0, eps: 0.0 })
+    }
+
+    fn normal_cone(&self, node: NodeId) -> NormalCone {
+        match self.paging.node(node) {
+            Some(found) if self.parents(node).next().is_some() => found.stored.cone(),
+            // The root list has no room for cones, so roots have none.
+            _ => NormalCone::NONE,
+        }
     }
 
     #[inline]

@@ -1,177 +1,442 @@
-//! The forest of a collapse log, numbered depth-first: which leaves are below a node, and which triangles it brings.
+//! The forest of a collapse log, numbered depth-first, on disk: which leaves are below a node, and which triangles it
+//! brings.
 //!
 //! Leaves are numbered in the order in which a walk in preorder meets them, the child with the kept vertex first, so
 //! that every subtree is an interval of leaves and the vertex shown for a folded node is its first leaf (design of the
-//! displayed mesh: [`StarMesh`](vertex_tree::StarMesh)). Arrays over nodes are in the order of the log here.
+//! displayed mesh: [`StarMesh`](vertex_tree::StarMesh)). Nodes are numbered in preorder too: those below a node with `k`
+//! leaves are the `k - 2` after it, and where its children are follows from how many leaves they have.
 //!
-//! Everything is linear in the log but for the search for the node that brings a triangle, which walks up the tree from
-//! one of its corners; about 30 bytes a node and 16 a triangle are needed beside the log.
+//! The log may be larger than memory. It is read in sequence: once forwards for the number of leaves below each vertex,
+//! once backwards for their places, with 4 bytes a vertex in memory; everything else is sorted in temporary files. To
+//! find the node that brings a triangle, subtrees that fit in memory are loaded one after the other, each with the
+//! triangles that have two corners in it; the few nodes above these, and the triangles that have no two corners in the
+//! same one, stay in memory.
 
-use vertex_tree::{CollapseLog, Forest, LogError, NONE};
+use std::cell::RefCell;
+use std::io;
+use std::ops::Range;
+use std::path::PathBuf;
+use std::sync::atomic::{AtomicBool, Ordering};
 
-/// The leaves below a node are `first..end`; those from `pivot` on are below the removed vertex.
-#[derive(Clone, Copy, Debug, Default)]
-pub(crate) struct Span {
-    pub first: u32,
-    pub pivot: u32,
-    pub end: u32,
+use vertex_tree::external::{Paged, Scratch, Sorter, Spool};
+use vertex_tree::{Bounds, Collapse, LogError, LogSource, NONE};
+
+use crate::error::MetaNodeError;
+use crate::subtree::{Span, Subtree};
+
+/// What a hierarchy may take that is larger than memory.
+#[derive(Clone, Debug)]
+pub struct Workspace<'a> {
+    /// Where temporary files are made.
+    pub folder: PathBuf,
+    /// Bytes of memory. Beside this, 5 bytes a vertex and 40 a page are needed.
+    pub memory: u64,
+    /// Set by whoever wants it to end: it fails with [`MetaNodeError::Interrupted`] soon afterwards.
+    pub stop: &'a AtomicBool,
+}
+
+/// A node.
+#[derive(Clone, Debug)]
+pub(crate) struct Node {
+    pub span: Span,
+    /// Its number in the log.
+    pub log_number: u32,
+    pub bounds: Bounds,
+    /// [`NONE`] for a root.
+    pub parent: u32,
+    /// The triangles that it brings.
+    pub brought: Range<u32>,
 }
 
 /// A log arranged.
 pub(crate) struct Arrangement<'a> {
-    pub log: &'a CollapseLog,
-    pub forest: Forest,
-    /// Of each node.
-    pub spans: Vec<Span>,
+    /// Vertices and triangles of the input; of the triangles, those with a doubled corner, which are never shown and left
+    /// out.
+    pub leaves: u32,
+    pub triangles: u32,
+    pub doubled: u32,
+    /// How many nodes there are.
+    pub nodes: u32,
     /// The roots in the order of their leaves.
     pub roots: Vec<u32>,
     /// The first leaves of the trees, and the vertices that no collapse touches.
     pub base_leaves: Vec<u32>,
-    /// The input vertex of each leaf.
-    pub vertex_of_leaf: Vec<u32>,
-    /// Three leaves each, those that node `n` brings at `starts[n]..starts[n + 1]`; those of the base mesh last.
-    pub triangles: Vec<[u32; 3]>,
-    pub starts: Vec<u32>,
+    /// The triangles that are shown while every node is folded: three leaves each.
+    pub base_triangles: Vec<[u32; 3]>,
+    stored: RefCell<Stored>,
+    stop: &'a AtomicBool,
+}
+
+/// What is on disk.
+struct Stored {
+    nodes: Paged<12>,
+    brought: Paged<3>,
+    places: Paged<3>,
+    /// What has gone wrong.
+    failed: Option<io::Error>,
 }
 
 impl<'a> Arrangement<'a> {
-    pub fn new(log: &'a CollapseLog) -> Result<Self, LogError> {
-        let forest = log.forest()?;
-        let count = log.collapses.len();
-        // Leaves below each node, until their places are known. Children come before their parents in the log.
-        let mut spans = vec![Span::default(); count];
-        let below = |spans: &[Span], child: u32| if child == NONE { 1 } else { spans[child as usize].end };
-        for n in 0..count {
-            spans[n].end = below(&spans, forest.kept_child[n]) + below(&spans, forest.removed_child[n]);
-        }
-        let mut vertex_of_leaf = vec![NONE; log.mesh.positions.len()];
-        let (mut roots, mut base_leaves, mut next) = (Vec::new(), Vec::new(), 0);
-        for n in (0..count).rev() {
-            let leaves = spans[n].end;
-            if forest.parent[n] == NONE {
-                // A tree takes the next free interval; the place of any other node is fixed by its parent.
-                spans[n].first = next;
-                roots.push(n as u32);
-                base_leaves.push(next);
-                next += leaves;
-            }
-            let Span { first, .. } = spans[n];
-            let (kept, removed) = (forest.kept_child[n], forest.removed_child[n]);
-            let pivot = first + below(&spans, kept);
-            spans[n] = Span { first, pivot, end: first + leaves };
-            let collapse = &log.collapses[n];
-            for (child, vertex, at) in [(kept, collapse.kept, first), (removed, collapse.removed, pivot)] {
-                if child == NONE {
-                    vertex_of_leaf[at as usize] = vertex;
-                } else {
-                    spans[child as usize].first = at;
-                }
-            }
-        }
-        for (v, &root) in (0..).zip(&forest.root_of_vertex) {
-            if root == NONE {
-                vertex_of_leaf[next as usize] = v;
-                base_leaves.push(next);
-                next += 1;
-            }
-        }
-        let mut arrangement = Self {
-            log,
-            forest,
-            spans,
-            roots,
-            base_leaves,
-            vertex_of_leaf,
-            triangles: Vec::new(),
-            starts: Vec::new(),
-        };
-        arrangement.sort_triangles();
-        Ok(arrangement)
+    /// Arranges a log.
+    pub fn new(log: &dyn LogSource, workspace: &Workspace<'a>) -> Result<Self, MetaNodeError> {
+        let scratch = Scratch { folder: workspace.folder.clone() };
+        let memory = usize::try_from(workspace.memory).unwrap_or(usize::MAX) / 4;
+        let arranging = Arranging { log, scratch, memory, base_leaves: Vec::new(), stop: workspace.stop };
+        arranging.run().map_err(|error| match error {
+            Failure::Log(error) => error.into(),
+            Failure::Io(_) if workspace.stop.load(Ordering::Relaxed) => MetaNodeError::Interrupted,
+            Failure::Io(source) => MetaNodeError::Temporary { folder: workspace.folder.clone(), source },
+        })
     }
 
-    /// The triangles that a node brings when it unfolds.
-    pub fn brought(&self, node: u32) -> &[[u32; 3]] {
-        let node = node as usize;
-        &self.triangles[self.starts[node] as usize..self.starts[node + 1] as usize]
+    /// A node by its number in preorder.
+    pub fn node(&self, n: u32) -> Node {
+        let mut stored = self.stored.borrow_mut();
+        let words = check_stop(self.stop).and_then(|()| stored.nodes.get(n.into()));
+        let words = stored.or_fail(words, [0; 12]);
+        let [first, pivot, end, log_number, x, y, z, radius, eps, parent, start, count] = words;
+        let [x, y, z, radius, eps] = [x, y, z, radius, eps].map(f32::from_bits);
+        Node {
+            span: Span { first, pivot, end },
+            log_number,
+            bounds: Bounds { center: [x, y, z], radius, eps },
+            parent,
+            brought: start..start.saturating_add(count),
+        }
     }
 
-    /// The triangles that are shown while every node is folded.
-    pub fn base_triangles(&self) -> &[[u32; 3]] {
-        &self.triangles[self.starts[self.spans.len()] as usize..]
+    /// The children of a node, that of the kept vertex first; [`NONE`] for a leaf.
+    pub fn children(&self, n: u32) -> [u32; 2] {
+        self.node(n).span.children(n)
+    }
+
+    /// A triangle that a node brings: three leaves.
+    pub fn triangle(&self, t: u32) -> [u32; 3] {
+        let mut stored = self.stored.borrow_mut();
+        let leaves = stored.brought.get(t.into());
+        stored.or_fail(leaves, [0; 3])
     }
 
     /// The place of a leaf.
     pub fn position(&self, leaf: u32) -> [f32; 3] {
-        self.log.mesh.positions[self.vertex_of_leaf[leaf as usize] as usize]
+        let mut stored = self.stored.borrow_mut();
+        let words = stored.places.get(leaf.into());
+        stored.or_fail(words, [0; 3]).map(f32::from_bits)
     }
 
-    /// The children of a node, that of the kept vertex first; [`NONE`] for a leaf.
-    pub fn children(&self, node: u32) -> [u32; 2] {
-        [self.forest.kept_child[node as usize], self.forest.removed_child[node as usize]]
+    /// Fails if anything could not be read since: what came instead then is a leaf, or nothing.
+    pub fn check(&self) -> io::Result<()> {
+        self.stored.borrow_mut().failed.take().map_or(Ok(()), Err)
     }
+}
 
-    /// Counting sort of the triangles by the node that brings them. Those with a doubled corner are never shown and are
-    /// left out.
-    fn sort_triangles(&mut self) {
-        let count = self.spans.len();
-        let mut leaf_of_vertex = vec![0_u32; self.vertex_of_leaf.len()];
-        for (leaf, &v) in (0..).zip(&self.vertex_of_leaf) {
-            leaf_of_vertex[v as usize] = leaf;
+impl Stored {
+    fn or_fail<T>(&mut self, outcome: io::Result<T>, otherwise: T) -> T {
+        outcome.unwrap_or_else(|error| {
+            self.failed.get_or_insert(error);
+            otherwise
+        })
+    }
+}
+
+/// What can go wrong.
+enum Failure {
+    Log(LogError),
+    Io(io::Error),
+}
+
+impl From<io::Error> for Failure {
+    fn from(error: io::Error) -> Self {
+        Self::Io(error)
+    }
+}
+
+impl From<LogError> for Failure {
+    fn from(error: LogError) -> Self {
+        Self::Log(error)
+    }
+}
+
+/// What the nodes above the subtrees that are loaded are to each other, and which subtrees there are.
+#[derive(Default)]
+struct Upper {
+    subtree: Subtree,
+    /// The leaves of the subtrees.
+    below: Vec<Range<u32>>,
+}
+
+impl Upper {
+    /// The subtree in which a leaf is.
+    fn below(&self, leaf: u32) -> Option<usize> {
+        let at = self.below.partition_point(|leaves| leaves.start <= leaf).checked_sub(1)?;
+        self.below[at].contains(&leaf).then_some(at)
+    }
+}
+
+struct Arranging<'a, 's> {
+    log: &'a dyn LogSource,
+    scratch: Scratch,
+    /// Bytes that a sort, or what is loaded, may take.
+    memory: usize,
+    base_leaves: Vec<u32>,
+    stop: &'s AtomicBool,
+}
+
+impl<'s> Arranging<'_, 's> {
+    fn run(mut self) -> Result<Arrangement<'s>, Failure> {
+        let counts = self.log.counts();
+        // Leaves below each vertex, then their places: one array for both.
+        let mut leaves = vec![1_u32; counts.vertices as usize];
+        let mut halves = self.count_leaves(&mut leaves)?;
+        let nodes = self.place_leaves(&mut halves, &mut leaves)?;
+        drop(halves);
+        let most = u32::try_from(self.memory / SUBTREE_BYTES).unwrap_or(u32::MAX).max(2);
+        let (mut upper, mut sorted) = self.sort_nodes(nodes, most)?;
+        let places = self.sort_positions(&leaves)?;
+        let (mut triangles, numbers, above, doubled) = self.sort_triangles(&leaves, &upper)?;
+        drop(leaves);
+
+        // Those brought by the nodes above, and those that nothing brings.
+        let mut base_triangles = Vec::new();
+        upper.subtree.finish();
+        for leaves in above {
+            match upper.subtree.bringer(leaves) {
+                NONE => base_triangles.push(leaves),
+                n => upper.subtree.add(n, leaves),
+            }
         }
-        let mut above_leaf = vec![NONE; self.vertex_of_leaf.len()];
-        for (n, span) in (0..).zip(&self.spans) {
-            for (start, end) in [(span.first, span.pivot), (span.pivot, span.end)] {
-                if end - start == 1 {
-                    above_leaf[start as usize] = n;
+        let (brought_above, starts_above) = upper.subtree.sorted();
+
+        let mut stored = Storing {
+            nodes: self.scratch.spool()?,
+            brought: self.scratch.spool()?,
+            above: Vec::new(),
+            roots: Vec::new(),
+        };
+        let mut sorted = sorted.read()?;
+        let mut triangles = triangles.read()?;
+        let (mut at_above, mut at_below) = (0, 0);
+        let mut loaded = Vec::new();
+        while let Some(node) = sorted.next() {
+            check_stop(self.stop)?;
+            let node = node?;
+            let count = node[2] - node[0];
+            if count > most {
+                let range = starts_above[at_above] as usize..starts_above[at_above + 1] as usize;
+                stored.push(node, &brought_above[range])?;
+                at_above += 1;
+                continue;
+            }
+            let mut subtree = Subtree::default();
+            loaded.clear();
+            loaded.push(node);
+            for _ in 2..count {
+                loaded.push(sorted.next().ok_or_else(too_few)??);
+            }
+            loaded.iter().for_each(|&[first, pivot, end, ..]| subtree.push(Span { first, pivot, end }));
+            subtree.finish();
+            for _ in 0..numbers[at_below] {
+                let leaves = triangles.next().ok_or_else(too_few)??;
+                subtree.add(subtree.bringer(leaves), leaves);
+            }
+            let (brought, starts) = subtree.sorted();
+            for (&node, ends) in loaded.iter().zip(starts.windows(2)) {
+                stored.push(node, &brought[ends[0] as usize..ends[1] as usize])?;
+            }
+            at_below += 1;
+        }
+        Ok(Arrangement {
+            leaves: counts.vertices as u32,
+            triangles: counts.triangles as u32,
+            doubled,
+            nodes: stored.nodes.len() as u32,
+            roots: stored.roots,
+            base_leaves: self.base_leaves,
+            base_triangles,
+            stored: RefCell::new(Stored {
+                nodes: stored.nodes.into_paged(2 * self.memory)?,
+                brought: stored.brought.into_paged(self.memory / 2)?,
+                places: places.into_paged(self.memory / 2)?,
+                failed: None,
+            }),
+            stop: self.stop,
+        })
+    }
+
+    /// Counts the leaves below each vertex, and gives for each collapse those of the kept and of the removed one. Finds
+    /// whether the collapses make a log.
+    fn count_leaves(&self, below: &mut [u32]) -> Result<Spool<2>, Failure> {
+        let mut halves = self.scratch.spool()?;
+        for (n, c) in self.log.collapses().enumerate() {
+            check_stop(self.stop)?;
+            let c = c?;
+            check(n, &c, below)?;
+            let [kept, removed] = [c.kept, c.removed].map(|v| below[v as usize]);
+            halves.push([kept, removed])?;
+            // What is removed has no leaves any more.
+            below[c.kept as usize] = kept + removed;
+            below[c.removed as usize] = 0;
+        }
+        Ok(halves)
+    }
+
+    /// Finds the leaf of each vertex, and puts the nodes in preorder: by their first leaf, and the larger ones first.
+    fn place_leaves(&mut self, halves: &mut Spool<2>, place: &mut [u32]) -> Result<Sorter<9>, Failure> {
+        let mut nodes = Sorter::new(&self.scratch, self.memory);
+        place.fill(NONE);
+        let (mut next, mut n) = (0, halves.len() as u32);
+        for (c, halves) in self.log.collapses_back().zip(halves.read_back()?) {
+            check_stop(self.stop)?;
+            let (c, [kept, removed]) = (c?, halves?);
+            n -= 1;
+            if place[c.kept as usize] == NONE {
+                // A tree takes the next free interval; the place of any other node is fixed by its parent.
+                place[c.kept as usize] = next;
+                self.base_leaves.push(next);
+                next += kept + removed;
+            }
+            let first = place[c.kept as usize];
+            place[c.removed as usize] = first + kept;
+            let Bounds { center: [x, y, z], radius, eps } = c.bounds;
+            let [x, y, z, radius, eps] = [x, y, z, radius, eps].map(f32::to_bits);
+            nodes.push([first, !(kept + removed), first + kept, n, x, y, z, radius, eps])?;
+        }
+        for place in place.iter_mut().filter(|place| **place == NONE) {
+            *place = next;
+            self.base_leaves.push(next);
+            next += 1;
+        }
+        Ok(nodes)
+    }
+
+    /// Sorts the nodes, and finds the subtrees of at most so many leaves and the nodes above them.
+    fn sort_nodes(&self, nodes: Sorter<9>, most: u32) -> io::Result<(Upper, Spool<9>)> {
+        let (mut upper, mut sorted, mut covered) = (Upper::default(), self.scratch.spool()?, 0);
+        nodes.finish(|[first, leaves, pivot, rest @ ..]| {
+            let end = first + !leaves;
+            if end - first > most {
+                upper.subtree.push(Span { first, pivot, end });
+            } else if first >= covered {
+                upper.below.push(first..end);
+                covered = end;
+            }
+            let [n, x, y, z, radius, eps] = rest;
+            sorted.push([first, pivot, end, n, x, y, z, radius, eps])
+        })?;
+        Ok((upper, sorted))
+    }
+
+    /// The places of the leaves in order.
+    fn sort_positions(&self, leaf: &[u32]) -> Result<Spool<3>, Failure> {
+        let mut by_leaf = Sorter::<4>::new(&self.scratch, self.memory);
+        for (vertex, position) in self.log.positions().enumerate() {
+            check_stop(self.stop)?;
+            let position = position?;
+            if !position.iter().all(|x| x.is_finite()) {
+                return Err(LogError::BadPosition { vertex, position }.into());
+            }
+            let [x, y, z] = position.map(f32::to_bits);
+            by_leaf.push([leaf[vertex], x, y, z])?;
+        }
+        let mut places = self.scratch.spool()?;
+        by_leaf.finish(|[_, x, y, z]| places.push([x, y, z]))?;
+        Ok(places)
+    }
+
+    /// The triangles as three leaves each: those of each subtree, one subtree after the other; how many each has; those with no
+    /// two corners in the same one; and how many have a doubled corner.
+    #[expect(clippy::type_complexity, reason = "it is taken apart at once")]
+    fn sort_triangles(
+        &self,
+        leaf: &[u32],
+        upper: &Upper,
+    ) -> Result<(Spool<3>, Vec<u32>, Vec<[u32; 3]>, u32), Failure> {
+        let mut by_subtree = Sorter::<5>::new(&self.scratch, self.memory);
+        let (mut above, mut doubled) = (Vec::new(), 0);
+        for (t, corners) in self.log.triangles().enumerate() {
+            check_stop(self.stop)?;
+            let corners = corners?;
+            if let Some(&vertex) = corners.iter().find(|&&v| v as usize >= leaf.len()) {
+                return Err(LogError::CornerOutOfRange { triangle: t, vertex, vertices: leaf.len() }.into());
+            }
+            let leaves = corners.map(|v| leaf[v as usize]);
+            let mut ordered = leaves;
+            ordered.sort_unstable();
+            if ordered[0] == ordered[1] || ordered[1] == ordered[2] {
+                doubled += 1;
+                continue;
+            }
+            let [a, b, c] = ordered.map(|leaf| upper.below(leaf));
+            match b.filter(|_| a == b || b == c) {
+                Some(subtree) => {
+                    by_subtree.push([subtree as u32, t as u32, leaves[0], leaves[1], leaves[2]])?;
                 }
+                None => above.push(leaves),
             }
         }
-        let input = &self.log.mesh.triangles;
-        let leaves = |corners: &[u32; 3]| corners.map(|v| leaf_of_vertex[v as usize]);
-        let bringers: Vec<Option<u32>> =
-            input.iter().map(|corners| self.bringer(leaves(corners), &above_leaf)).collect();
-        let bucket = |bringer: u32| if bringer == NONE { count } else { bringer as usize };
-        let mut starts = vec![0_u32; count + 2];
-        for &bringer in bringers.iter().flatten() {
-            starts[bucket(bringer) + 1] += 1;
-        }
-        for n in 0..=count {
-            starts[n + 1] += starts[n];
-        }
-        let mut triangles = vec![[0; 3]; starts[count + 1] as usize];
-        let mut next = starts.clone();
-        for (corners, bringer) in input.iter().zip(&bringers) {
-            if let Some(bringer) = *bringer {
-                let at = &mut next[bucket(bringer)];
-                triangles[*at as usize] = leaves(corners);
-                *at += 1;
-            }
-        }
-        starts.truncate(count + 1);
-        (self.triangles, self.starts) = (triangles, starts);
+        let (mut triangles, mut numbers) = (self.scratch.spool()?, vec![0; upper.below.len()]);
+        by_subtree.finish(|[subtree, _, a, b, c]| {
+            numbers[subtree as usize] += 1;
+            triangles.push([a, b, c])
+        })?;
+        Ok((triangles, numbers, above, doubled))
     }
+}
 
-    /// The node at which two corners of a triangle merge first: the lower one of their lowest common ancestors.
-    /// [`NONE`] if all corners stay apart; nothing if two are the same leaf.
-    fn bringer(&self, mut leaves: [u32; 3], above_leaf: &[u32]) -> Option<u32> {
-        leaves.sort_unstable();
-        let [a, b, c] = leaves;
-        if a == b || b == c {
-            return None;
+/// Bytes of memory that a subtree takes while it is loaded, for each of its leaves: 52 for a node and its place, and 40 for
+/// two triangles.
+const SUBTREE_BYTES: usize = 96;
+
+/// Fails if a collapse is none that can be. `below` has the leaves below each vertex: none if it has been removed.
+fn check(n: usize, c: &Collapse, below: &[u32]) -> Result<(), LogError> {
+    for vertex in [c.removed, c.kept] {
+        if below.get(vertex as usize).is_none_or(|&leaves| leaves == 0) {
+            return Err(LogError::NoSuchVertex { collapse: n, vertex });
         }
-        // One of the two lies below or at the other, if both exist: the one with fewer leaves.
-        let leaves_below = |n: u32| match self.spans.get(n as usize) {
-            Some(span) => span.end - span.first,
-            None => u32::MAX,
-        };
-        let meet = |low: u32, high: u32| {
-            let mut n = above_leaf[low as usize];
-            while n != NONE && self.spans[n as usize].end <= high {
-                n = self.forest.parent[n as usize];
-            }
-            n
-        };
-        let (ab, bc) = (meet(a, b), meet(b, c));
-        Some(if leaves_below(ab) <= leaves_below(bc) { ab } else { bc })
     }
+    if c.removed == c.kept {
+        return Err(LogError::IntoItself { collapse: n, vertex: c.kept });
+    }
+    if crate::page::are_sane(&c.bounds) {
+        Ok(())
+    } else {
+        Err(LogError::BadBounds { collapse: n, bounds: c.bounds })
+    }
+}
+
+/// The nodes and their triangles on their way to disk.
+struct Storing {
+    nodes: Spool<12>,
+    brought: Spool<3>,
+    /// The nodes above the next one: where their leaves end, and their numbers.
+    above: Vec<(u32, u32)>,
+    roots: Vec<u32>,
+}
+
+impl Storing {
+    fn push(&mut self, node: [u32; 9], brought: &[[u32; 3]]) -> io::Result<()> {
+        let [first, pivot, end, n, x, y, z, radius, eps] = node;
+        let (number, start) = (self.nodes.len() as u32, self.brought.len() as u32);
+        while self.above.last().is_some_and(|&(end, _)| end <= first) {
+            self.above.pop();
+        }
+        let parent = self.above.last().map_or(NONE, |&(_, above)| above);
+        if parent == NONE {
+            self.roots.push(number);
+        }
+        self.above.push((end, number));
+        brought.iter().try_for_each(|&leaves| self.brought.push(leaves))?;
+        let count = brought.len() as u32;
+        self.nodes.push([first, pivot, end, n, x, y, z, radius, eps, parent, start, count])
+    }
+}
+
+/// Fails if somebody wants the work to stop.
+fn check_stop(stop: &AtomicBool) -> io::Result<()> {
+    if stop.load(Ordering::Relaxed) { Err(io::Error::other("interrupted")) } else { Ok(()) }
+}
+
+/// A temporary file has fewer records than were written.
+fn too_few() -> io::Error {
+    io::ErrorKind::UnexpectedEof.into()
 }

@@ -36,7 +36,7 @@ pub(crate) struct Blocking {
     pub blocks: Vec<u32>,
     pub pages: Vec<PageNodes>,
     pub root_pages: u32,
-    /// The number of each node of the log.
+    /// The number of each node in the file.
     pub number: Vec<NodeId>,
     /// The topmost nodes of blocks that have been joined to the block above.
     joined: Vec<bool>,
@@ -84,7 +84,7 @@ fn size(arrangement: &Arrangement, top: u32, levels: u32) -> Size {
     let (mut nodes, mut links, mut triangles) = (0, 0, 0);
     let count = |n: u32| {
         nodes += 1;
-        triangles += arrangement.brought(n).len();
+        triangles += arrangement.node(n).brought.len();
     };
     walk_block(arrangement, top, levels, |_| false, count, |_| links += 1);
     Size { nodes, words: page::block_words(nodes, links, triangles) }
@@ -123,8 +123,8 @@ impl Blocking {
             blocks: Vec::new(),
             pages: Vec::new(),
             root_pages: 0,
-            number: vec![NodeId(NONE); arrangement.spans.len()],
-            joined: vec![false; arrangement.spans.len()],
+            number: vec![NodeId(NONE); arrangement.nodes as usize],
+            joined: vec![false; arrangement.nodes as usize],
         };
         let room = Size { nodes: 1 << slot_bits, words: page_bytes as usize / 4 };
         blocking.pack(arrangement, &arrangement.roots, NONE, room);
@@ -191,7 +191,7 @@ impl Blocking {
     /// Joins what is below some blocks to them while there is room on their page.
     fn join(&mut self, arrangement: &Arrangement, mut used: Size, tops: &[u32], room: Size) {
         // What is not negative is in the order of its bits.
-        let key = |top: u32| (arrangement.log.collapses[top as usize].bounds.eps.to_bits(), top);
+        let key = |top: u32| (arrangement.node(top).bounds.eps.to_bits(), top);
         let mut below = BinaryHeap::new();
         let add = |below: &mut BinaryHeap<(u32, u32)>, top: u32| {
             walk_block(arrangement, top, self.levels, |_| false, |_| (), |top| below.push(key(top)));

@@ -1,6 +1,7 @@
 //! What can be wrong with a file of meta-nodes, or with what is asked of it.
 
 use std::io;
+use std::path::PathBuf;
 
 use vertex_tree::LogError;
 
@@ -20,6 +21,17 @@ pub enum MetaNodeError {
         /// Why.
         source: io::Error,
     },
+    /// A temporary file can not be written or read.
+    #[error("temporary files in {}: {source}", folder.display())]
+    Temporary {
+        /// Where they are made.
+        folder: PathBuf,
+        /// Why.
+        source: io::Error,
+    },
+    /// Somebody wanted it to end.
+    #[error("interrupted")]
+    Interrupted,
     /// The collapse log does not fit its mesh.
     #[error(transparent)]
     Log(#[from] LogError),

@@ -126,6 +126,12 @@ impl MetaNodeFile {
         self.source.name()
     }
 
+    /// Bytes of a page, as it is stored and as its place holder is large.
+    #[must_use]
+    pub fn page_bytes(&self, page: u32) -> Option<u64> {
+        self.lengths.get(page as usize).map(|&words| 4 * u64::from(words))
+    }
+
     /// Words of a page.
     pub(crate) fn page_words(&self, page: u32) -> usize {
         self.lengths[page as usize] as usize
@@ -139,7 +145,7 @@ impl MetaNodeFile {
         HEADER_BYTES + self.header.tables_bytes() + 4 * (self.starts[page / STRIDE] + words)
     }
 
-    /// Bytes of a place holder.
+    /// Bytes of the largest place holder.
     pub(crate) fn holder_bytes(&self) -> u64 {
         4 * u64::from(self.header.largest_words).max(1)
     }

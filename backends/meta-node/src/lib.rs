@@ -33,15 +33,17 @@ mod page;
 mod pager;
 mod settings;
 mod store;
+mod subtree;
 mod tree;
 mod verify;
 mod waiting;
 mod write;
 
+pub use arrange::Workspace;
 pub use dependencies::Dependencies;
 pub use error::MetaNodeError;
 pub use file::MetaNodeFile;
 pub use format::MAGIC;
 pub use settings::{InUse, Io, Settings};
 pub use tree::MetaNodeTree;
-pub use write::{BuildOptions, WriteReport, write};
+pub use write::{BuildOptions, WriteReport, write, write_within};

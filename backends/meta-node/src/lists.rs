@@ -5,7 +5,7 @@ use vertex_tree::NONE;
 /// What a place holder is to the navigation.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum Class {
-    /// Empty, or its page is neither in use nor referred to: the free list, first in, first out. The page stays where it
+    /// Its page is neither in use nor referred to: the free list, first in, first out. The page stays where it
     /// is until its place is taken: its second chance.
     Free,
     /// Some page in use refers to its page.
@@ -23,7 +23,7 @@ impl Class {
 
 const KINDS: usize = 4;
 
-/// In no list: on its way, never evicted, or given back.
+/// In no list: on its way, never evicted, or empty.
 const OUTSIDE: u8 = KINDS as u8;
 
 /// Doubly linked lists through arrays: every move is O(1) and none allocates.
@@ -78,21 +78,12 @@ impl Lists {
     /// Moves a holder to the end of a list.
     pub fn push(&mut self, holder: u32, class: Class) {
         self.remove(holder);
-        let head = (self.holders + class as usize) as u32;
-        self.insert(holder, self.before[head as usize], class);
-    }
-
-    /// Moves a holder to the start of a list.
-    pub fn push_front(&mut self, holder: u32, class: Class) {
-        self.remove(holder);
-        self.insert(holder, (self.holders + class as usize) as u32, class);
-    }
-
-    fn insert(&mut self, holder: u32, after: u32, class: Class) {
-        let next = std::mem::replace(&mut self.after[after as usize], holder);
-        self.before[next as usize] = holder;
-        self.before[holder as usize] = after;
-        self.after[holder as usize] = next;
+        let head = self.holders + class as usize;
+        let last = self.before[head];
+        self.before[holder as usize] = last;
+        self.after[holder as usize] = head as u32;
+        self.after[last as usize] = holder;
+        self.before[head] = holder;
         self.class[holder as usize] = class as u8;
         self.len[class as usize] += 1;
     }
@@ -108,9 +99,8 @@ mod tests {
         assert_eq!(lists.front(Class::Free), None);
         (0..4).for_each(|h| lists.push(h, Class::Free));
         lists.push(0, Class::Free);
-        lists.push_front(3, Class::Free);
         lists.push(2, Class::InUse);
-        assert_eq!(lists.iter(Class::Free).collect::<Vec<_>>(), [3, 1, 0]);
+        assert_eq!(lists.iter(Class::Free).collect::<Vec<_>>(), [1, 3, 0]);
         assert_eq!(lists.iter(Class::Foreseen).next(), None);
         let mut order = Vec::new();
         while let Some(h) = lists.front(Class::Free) {
@@ -119,7 +109,7 @@ mod tests {
             lists.remove(h);
             lists.remove(h);
         }
-        assert_eq!(order, [3, 1, 0]);
+        assert_eq!(order, [1, 3, 0]);
         assert_eq!(
             (lists.front(Class::InUse), lists.len(Class::InUse), lists.len(Class::Free)),
             (Some(2), 1, 0)

@@ -150,6 +150,15 @@ impl<'a> Page<'a> {
         }
     }
 
+    /// Starts to read the triangles that the node in a slot brings.
+    #[inline(always)]
+    pub fn prefetch_brought(self, slot: u32) {
+        if slot < self.layout.nodes {
+            let (start, _) = self.brought_range(slot);
+            prefetch(self.words, self.layout.triangles_at as usize + TRIANGLE_WORDS * start as usize);
+        }
+    }
+
     /// The node above a block's topmost one, and its number in the log.
     #[inline]
     pub fn above(self, block: u32) -> (u32, u32) {

@@ -71,7 +71,7 @@ impl MetaNodeTree {
         self.pager.set_page_memory(bytes)
     }
 
-    /// Asks for every page for which there is a free place. Once these have [come](VertexTree::settle), a tree with memory
+    /// Asks for every page for which there is room. Once these have [come](VertexTree::settle), a tree with memory
     /// for everything misses nothing.
     pub fn load_all(&mut self) {
         self.pager.load_all();
@@ -340,8 +340,17 @@ impl VertexTree for MetaNodeTree {
                 if let Some(stars) = &self.mesh
                     && slot < page.layout.nodes
                 {
-                    // The triangles that come with a split follow each other in few cache lines.
-                    stars.prepare(page.node(slot).leaves(), &[], step - 3, mesh);
+                    let leaves = page.node(slot).leaves();
+                    if step == 3 {
+                        page.prefetch_brought(slot);
+                        stars.prepare(leaves, &[], 0, mesh);
+                        return;
+                    }
+                    // Most nodes bring two triangles; what there is beyond that is not prepared.
+                    let mut brought = [LeafTriangle::new([0; 3], 0, 0); 2];
+                    let two = brought.iter_mut().zip(page.brought(slot));
+                    let count = two.map(|(place, leaves)| *place = LeafTriangle::new(leaves, 0, 0)).count();
+                    stars.prepare(leaves, &brought[..count], step - 3, mesh);
                 }
             }
         }

@@ -3,14 +3,16 @@
 use std::fs::File;
 use std::io::{self, BufWriter, Seek, SeekFrom, Write};
 use std::path::Path;
+use std::sync::atomic::{AtomicBool, Ordering};
 
-use vertex_tree::{CollapseLog, NONE, output};
+use vertex_tree::{CollapseLog, LogSource, NONE, output};
 
-use crate::arrange::{Arrangement, Span};
+use crate::arrange::{Arrangement, Node, Workspace};
 use crate::blocking::{self, Blocking};
 use crate::error::MetaNodeError;
 use crate::format::{HEADER_BYTES, Header};
 use crate::page::{self, Child};
+use crate::subtree::Span;
 
 /// How a file is laid out.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -44,18 +46,33 @@ pub struct WriteReport {
     pub bytes: u64,
 }
 
-/// Writes the hierarchy of a log: whole, or not at all.
-///
-/// Takes time in proportion to the log, and beside the log about 41 bytes a node and 16 a triangle of memory; the file
-/// itself is written page by page.
+/// Writes the hierarchy of a log that is in memory: whole, or not at all. Temporary files are made beside `path`, and as
+/// much memory is taken as serves.
 ///
 /// # Errors
-/// [`MetaNodeError::Log`], [`MetaNodeError::Levels`], [`MetaNodeError::TooLarge`], [`MetaNodeError::Io`].
+/// As for [`write_within`].
 pub fn write(path: &Path, log: &CollapseLog, options: &BuildOptions) -> Result<WriteReport, MetaNodeError> {
+    let folder = path.parent().filter(|folder| !folder.as_os_str().is_empty()).unwrap_or(Path::new("."));
+    let stop = &AtomicBool::new(false);
+    write_within(path, log, options, &Workspace { folder: folder.to_owned(), memory: u64::MAX, stop })
+}
+
+/// Writes the hierarchy of a log that may be larger than memory: whole, or not at all. The file is the same whatever the
+/// memory.
+///
+/// # Errors
+/// [`MetaNodeError::Log`], [`MetaNodeError::Levels`], [`MetaNodeError::TooLarge`], [`MetaNodeError::Io`],
+/// [`MetaNodeError::Temporary`], [`MetaNodeError::Interrupted`].
+pub fn write_within(
+    path: &Path,
+    log: &dyn LogSource,
+    options: &BuildOptions,
+    workspace: &Workspace<'_>,
+) -> Result<WriteReport, MetaNodeError> {
     if let Some(levels) = options.levels.filter(|levels| !(1..=page::MOST_LEVELS).contains(levels)) {
         return Err(MetaNodeError::Levels { levels, most: page::MOST_LEVELS });
     }
-    let arrangement = Arrangement::new(log)?;
+    let arrangement = Arrangement::new(log, workspace)?;
     let levels = options.levels.unwrap_or_else(|| blocking::levels_for(&arrangement, options.page_bytes));
     let blocking = Blocking::new(&arrangement, levels, options.page_bytes);
     let (pages, slots) = (blocking.pages.len() as u64, 1 << blocking.slot_bits);
@@ -65,13 +82,11 @@ pub fn write(path: &Path, log: &CollapseLog, options: &BuildOptions) -> Result<W
     let mut written = Header::default();
     output::write_with(path, |file| {
         written = Writer { arrangement: &arrangement, blocking: &blocking }.write(file)?;
-        Ok(())
+        arrangement.check()
     })
-    .map_err(|source| MetaNodeError::Io {
-        file: path.display().to_string(),
-        offset: 0,
-        length: 0,
-        source,
+    .map_err(|source| match source {
+        _ if workspace.stop.load(Ordering::Relaxed) => MetaNodeError::Interrupted,
+        source => MetaNodeError::Io { file: path.display().to_string(), offset: 0, length: 0, source },
     })?;
     Ok(WriteReport {
         levels,
@@ -90,15 +105,14 @@ struct Writer<'a> {
 impl Writer<'_> {
     fn write(&self, file: &mut File) -> io::Result<Header> {
         let Self { arrangement, blocking } = self;
-        let input = &arrangement.log.mesh;
         let mut header = Header {
-            leaves: input.positions.len() as u32,
-            collapses: arrangement.spans.len() as u32,
-            triangles: input.triangles.len() as u32,
-            doubled: (input.triangles.len() - arrangement.triangles.len()) as u32,
+            leaves: arrangement.leaves,
+            collapses: arrangement.nodes,
+            triangles: arrangement.triangles,
+            doubled: arrangement.doubled,
             roots: arrangement.roots.len() as u32,
             base_vertices: arrangement.base_leaves.len() as u32,
-            base_triangles: arrangement.base_triangles().len() as u32,
+            base_triangles: arrangement.base_triangles.len() as u32,
             pages: blocking.pages.len() as u32,
             root_pages: blocking.root_pages,
             levels: blocking.levels,
@@ -135,16 +149,16 @@ impl Writer<'_> {
     fn tables(&self, lengths: &[u32], mut put: impl FnMut(u32) -> io::Result<()>) -> io::Result<()> {
         let Self { arrangement, blocking } = self;
         for &root in &arrangement.roots {
-            let bounds = &arrangement.log.collapses[root as usize].bounds;
+            let node = arrangement.node(root);
             put(blocking.number[root as usize].0)?;
-            put(root)?;
-            page::bounds_words(bounds).into_iter().try_for_each(&mut put)?;
+            put(node.log_number)?;
+            page::bounds_words(&node.bounds).into_iter().try_for_each(&mut put)?;
         }
         for &leaf in &arrangement.base_leaves {
             put(leaf)?;
             arrangement.position(leaf).into_iter().map(f32::to_bits).try_for_each(&mut put)?;
         }
-        arrangement.base_triangles().iter().flatten().copied().try_for_each(&mut put)?;
+        arrangement.base_triangles.iter().flatten().copied().try_for_each(&mut put)?;
         lengths.iter().copied().try_for_each(put)
     }
 
@@ -163,12 +177,11 @@ impl Writer<'_> {
         let is_here = |n: u32| blocking.number[n as usize].0 >> blocking.slot_bits == page;
         let mut block = 0;
         for &n in &nodes {
-            let collapse = &arrangement.log.collapses[n as usize];
-            let span = arrangement.spans[n as usize];
-            words.extend(page::bounds_words(&collapse.bounds));
-            words.extend(arrangement.position(span.pivot).map(f32::to_bits));
-            words.extend([span.first, span.pivot, n]);
-            let [kept, removed] = arrangement.children(n).map(|child| match child {
+            let node = arrangement.node(n);
+            words.extend(page::bounds_words(&node.bounds));
+            words.extend(arrangement.position(node.span.pivot).map(f32::to_bits));
+            words.extend([node.span.first, node.span.pivot, node.log_number]);
+            let [kept, removed] = node.span.children(n).map(|child| match child {
                 NONE => Child::Leaf.encode(),
                 // Blocks that share a page hang below another page: a child here is in the same block, or in one joined to it.
                 child if is_here(child) => Child::Slot(slot(child)).encode(),
@@ -182,24 +195,28 @@ impl Writer<'_> {
                 words.push(0x8000 | block as u32);
                 block += 1;
             } else {
-                words.push(slot(arrangement.forest.parent[n as usize]));
+                words.push(slot(node.parent));
             }
-            triangles += arrangement.brought(n).len() as u32;
+            triangles += node.brought.len() as u32;
             words.push(triangles);
         }
         for &top in tops {
-            match arrangement.forest.parent[top as usize] {
+            match arrangement.node(top).parent {
                 NONE => words.extend([NONE, NONE]),
-                above => words.extend([blocking.number[above as usize].0, above]),
+                above => {
+                    words.extend([blocking.number[above as usize].0, arrangement.node(above).log_number]);
+                }
             }
         }
         for &link in &links {
-            words.extend([blocking.number[link as usize].0, link]);
-            words.extend(page::bounds_words(&arrangement.log.collapses[link as usize].bounds));
+            let node = arrangement.node(link);
+            words.extend([blocking.number[link as usize].0, node.log_number]);
+            words.extend(page::bounds_words(&node.bounds));
         }
         for &n in &nodes {
-            let Span { first, end, .. } = arrangement.spans[n as usize];
-            for &(mut corners) in arrangement.brought(n) {
+            let Node { span: Span { first, end, .. }, brought, .. } = arrangement.node(n);
+            for t in brought {
+                let mut corners = arrangement.triangle(t);
                 // Two corners are below the node, one on each side; the other comes first.
                 let far = corners.iter().position(|leaf| !(first..end).contains(leaf)).unwrap_or(0);
                 corners.rotate_left(far);

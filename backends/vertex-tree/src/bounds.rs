@@ -16,3 +16,18 @@ pub struct Bounds {
     /// Geometric error, at least 0.
     pub eps: f32,
 }
+
+/// A cone that holds the normals of all input triangles incident to any leaf below a node, and the cones of all nodes that
+/// must be folded before this one can be.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct NormalCone {
+    /// The direction of its axis.
+    pub axis: [f32; 3],
+    /// Sine of its half-angle, which is below 90 degrees; 1 and above say that there is no such cone.
+    pub sine: f32,
+}
+
+impl NormalCone {
+    /// All directions.
+    pub const NONE: Self = Self { axis: [0.0; 3], sine: 2.0 };
+}

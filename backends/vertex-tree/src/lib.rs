@@ -15,10 +15,12 @@
 //! Leaves of the forest are the input vertices. They can not be unfolded and have no [`NodeId`].
 
 mod bounds;
+pub mod external;
 mod leaf_map;
 mod leaf_set;
 mod log;
 mod log_file;
+mod log_source;
 mod mesh;
 pub mod output;
 mod prefetch;
@@ -29,9 +31,10 @@ mod star_mesh;
 mod stars;
 mod tree;
 
-pub use bounds::Bounds;
+pub use bounds::{Bounds, NormalCone};
 pub use log::{Collapse, CollapseLog, Forest, LogError, NONE};
 pub use log_file::{LogCounts, LogFileError, read_log, write_log, write_log_from};
+pub use log_source::{LogFile, LogSource, Records};
 pub use mesh::Mesh;
 pub use prefetch::prefetch;
 pub use sink::{MeshSink, NullSink, TriangleId, VertexId};

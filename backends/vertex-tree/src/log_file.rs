@@ -220,26 +220,31 @@ fn write_section<T>(
     }
 }
 
-/// Reads a log and checks it.
-///
-/// # Errors
-/// Whatever is wrong with the file; a log that is returned passes [`CollapseLog::forest`].
-pub fn read_log(path: &Path) -> Result<CollapseLog, LogFileError> {
+/// A log in a file whose header fits its length.
+#[derive(Debug)]
+pub(crate) struct Opened {
+    pub file: File,
+    pub counts: LogCounts,
+    /// Where positions, triangles, collapses and checksums begin, in bytes.
+    pub starts: [u64; 4],
+}
+
+/// Opens a log and reads its header.
+pub(crate) fn open(path: &Path) -> Result<Opened, LogFileError> {
     let io = |source| LogFileError::Io { file: path.to_owned(), source };
-    let file = File::open(path).map_err(io)?;
+    let mut file = File::open(path).map_err(io)?;
     let actual = file.metadata().map_err(io)?.len();
-    let mut input = BufReader::with_capacity(1 << 20, file);
     let mut header = [0; HEADER_BYTES as usize];
     if actual < HEADER_BYTES {
         let mut start = [0; MAGIC.len()];
-        return match input.read_exact(&mut start) {
+        return match file.read_exact(&mut start) {
             Ok(()) if start == MAGIC => {
                 Err(LogFileError::Length { file: path.to_owned(), expected: HEADER_BYTES, actual })
             }
             _ => Err(LogFileError::NotALog { file: path.to_owned() }),
         };
     }
-    input.read_exact(&mut header).map_err(io)?;
+    file.read_exact(&mut header).map_err(io)?;
     let word = |at: usize| u32::from_le_bytes([header[at], header[at + 1], header[at + 2], header[at + 3]]);
     let long = |at: usize| u64::from(word(at)) | u64::from(word(at + 4)) << 32;
     if header[..8] != MAGIC {
@@ -272,30 +277,51 @@ pub fn read_log(path: &Path) -> Result<CollapseLog, LogFileError> {
     if expected != actual {
         return Err(LogFileError::Length { file: path.to_owned(), expected, actual });
     }
+    let counts = LogCounts { vertices, triangles, collapses };
+    Ok(Opened { file, counts, starts: [positions_at, triangles_at, collapses_at, checksums_at] })
+}
 
-    let (positions, positions_sum) =
-        read_section(&mut input, vertices, |w: [u32; 3]| w.map(f32::from_bits)).map_err(io)?;
-    let (triangles, triangles_sum) = read_section(&mut input, triangles, |w: [u32; 3]| w).map_err(io)?;
-    let (collapses, collapses_sum) = read_section(&mut input, collapses, |w: [u32; 7]| Collapse {
-        removed: w[0],
-        kept: w[1],
-        bounds: Bounds {
-            center: [w[2], w[3], w[4]].map(f32::from_bits),
-            radius: f32::from_bits(w[5]),
-            eps: f32::from_bits(w[6]),
-        },
-    })
-    .map_err(io)?;
-    let (sums, _) = read_section(&mut input, 3, |[w]: [u32; 1]| w).map_err(io)?;
-    for (found, written, offset, section) in [
-        (positions_sum, sums[0], positions_at, "positions"),
-        (triangles_sum, sums[1], triangles_at, "triangles"),
-        (collapses_sum, sums[2], collapses_at, "collapses"),
-    ] {
+/// Compares the checksums of the sections with those that the file ends with.
+pub(crate) fn compare_checksums(
+    path: &Path,
+    found: [u32; 3],
+    written: &[u32],
+    starts: [u64; 4],
+) -> Result<(), LogFileError> {
+    let sections = ["positions", "triangles", "collapses"];
+    for (((found, written), offset), section) in found.iter().zip(written).zip(starts).zip(sections) {
         if found != written {
             return Err(LogFileError::Checksum { file: path.to_owned(), offset, section });
         }
     }
+    Ok(())
+}
+
+/// A collapse from its words in a file.
+pub(crate) fn collapse([removed, kept, x, y, z, radius, eps]: [u32; 7]) -> Collapse {
+    let bounds = Bounds {
+        center: [x, y, z].map(f32::from_bits),
+        radius: f32::from_bits(radius),
+        eps: f32::from_bits(eps),
+    };
+    Collapse { removed, kept, bounds }
+}
+
+/// Reads a log and checks it.
+///
+/// # Errors
+/// Whatever is wrong with the file; a log that is returned passes [`CollapseLog::forest`].
+pub fn read_log(path: &Path) -> Result<CollapseLog, LogFileError> {
+    let io = |source| LogFileError::Io { file: path.to_owned(), source };
+    let Opened { file, counts, starts } = open(path)?;
+    let mut input = BufReader::with_capacity(1 << 20, file);
+    let (positions, positions_sum) =
+        read_section(&mut input, counts.vertices, |w: [u32; 3]| w.map(f32::from_bits)).map_err(io)?;
+    let (triangles, triangles_sum) =
+        read_section(&mut input, counts.triangles, |w: [u32; 3]| w).map_err(io)?;
+    let (collapses, collapses_sum) = read_section(&mut input, counts.collapses, collapse).map_err(io)?;
+    let (sums, _) = read_section(&mut input, 3, |[w]: [u32; 1]| w).map_err(io)?;
+    compare_checksums(path, [positions_sum, triangles_sum, collapses_sum], &sums, starts)?;
     let log = CollapseLog { mesh: Mesh { positions, triangles }, collapses };
     log.forest().map_err(|source| LogFileError::Log { file: path.to_owned(), source })?;
     Ok(log)

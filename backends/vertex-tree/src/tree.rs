@@ -1,6 +1,6 @@
 //! The trait between the engine and the storage backends.
 
-use crate::{Bounds, MeshSink};
+use crate::{Bounds, MeshSink, NormalCone};
 
 /// Number of an inner node (a collapse) in a backend's own numbering, less than [`VertexTree::node_limit`].
 ///
@@ -139,6 +139,9 @@ pub trait VertexTree {
     /// status follows.
     const PREPARATION: usize = 0;
 
+    /// Whether nodes have cones of normals, see [`normal_cone`](Self::normal_cone).
+    const HAS_CONES: bool = false;
+
     /// One more than the largest node number.
     fn node_limit(&self) -> u32;
     /// How many triangles are displayed now; known also where the sink does not keep the mesh.
@@ -152,6 +155,12 @@ pub trait VertexTree {
     /// The children, each with its [`bounds`](Self::bounds): one access for a backend that stores them together.
     fn children_and_bounds(&self, node: NodeId) -> impl Iterator<Item = (NodeId, Bounds)> {
         self.children(node).map(|child| (child, self.bounds(child)))
+    }
+    /// The cone of normals of a node that is no root, asked for as it comes into play. Cones are nested as bounds are,
+    /// but for roots, which have none.
+    fn normal_cone(&self, node: NodeId) -> NormalCone {
+        let _ = node;
+        NormalCone::NONE
     }
     /// The structural parents, at least one but for a root, always in the same order.
     fn parents(&self, node: NodeId) -> impl Iterator<Item = NodeId>;

@@ -17,8 +17,7 @@ use std::fs::File;
 use std::io::{self, Read, Seek, SeekFrom, Write};
 use std::sync::Arc;
 
-/// Numbers of vertices in a block at the start.
-pub(super) const SPAN: u32 = 256;
+use super::super::order::SPAN;
 
 pub(super) const VERTEX_WORDS: usize = 22;
 pub(super) const TRIANGLE_WORDS: usize = 6;
@@ -35,7 +34,7 @@ pub(super) struct Counts {
 }
 
 impl Counts {
-    fn words(self) -> usize {
+    pub fn words(self) -> usize {
         self.vertices as usize * VERTEX_WORDS
             + self.triangles as usize * TRIANGLE_WORDS
             + self.nodes as usize * NODE_WORDS
@@ -191,21 +190,19 @@ impl Blocks {
         Ok(())
     }
 
-    /// Calls `take` with the words of each segment of a block, and how many of everything there are.
-    pub fn read(
-        &self,
-        block: u32,
-        words: &mut Vec<u32>,
-        mut take: impl FnMut(&[u32], Counts),
-    ) -> io::Result<()> {
-        for segment in &self.list[block as usize].segments {
-            words.resize(segment.counts.words(), 0);
+    /// Reads the words of a block, and says how many of everything each segment has.
+    pub fn read(&self, block: u32, words: &mut Vec<u32>) -> io::Result<Vec<Counts>> {
+        let segments = &self.list[block as usize].segments;
+        words.resize(segments.iter().map(|s| s.counts.words()).sum(), 0);
+        let mut rest = words.as_mut_slice();
+        for segment in segments {
+            let (words, behind) = rest.split_at_mut(segment.counts.words());
             let mut file = &*segment.file;
             file.seek(SeekFrom::Start(segment.offset))?;
             file.read_exact(bytemuck::cast_slice_mut(words))?;
-            take(words, segment.counts);
+            rest = behind;
         }
-        Ok(())
+        Ok(segments.iter().map(|s| s.counts).collect())
     }
 
     /// Makes one block of two until blocks have `span` numbers.

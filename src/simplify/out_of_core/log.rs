@@ -3,10 +3,10 @@
 use std::io;
 use std::ops::Range;
 
+use vertex_tree::external::{Scratch, Sorter, Spool};
+
 use super::super::Round;
 use super::super::rounds::Builder;
-use super::scratch::{Scratch, Spool};
-use super::sort::Sorter;
 
 /// The collapses in order, on disk.
 #[derive(Debug)]

@@ -136,9 +136,9 @@ impl Parts {
     }
 
     /// Puts slots in the place of numbers of vertices, and the corners that are not here behind the others.
-    pub fn find_slots(&mut self, blocks: &Blocks, list: &[(u32, Ring)], starts: &[u32]) {
+    pub fn find_slots(&mut self, numbers_in_block: u32, list: &[(u32, Ring)], starts: &[u32]) {
         self.node_of = FastMap::default();
-        let span = blocks.span() as usize;
+        let span = numbers_in_block as usize;
         let mut table_of = FastMap::default();
         let mut slots = vec![NONE; list.len() * span];
         for (i, &(block, _)) in list.iter().enumerate() {
@@ -151,7 +151,7 @@ impl Parts {
         let mut last = (NONE, NONE);
         let numbers = &mut self.numbers;
         let mut slot = |number: u32| {
-            let block = blocks.of(number);
+            let block = number / numbers_in_block;
             if block != last.0 {
                 last = (block, table_of.get(&block).copied().unwrap_or(NONE));
             }

@@ -1,34 +1,19 @@
 //! The passes: each goes once through the mesh, window by window.
 
 use std::io;
-use std::ops::Range;
 use std::sync::atomic::{AtomicBool, Ordering};
 
+use parking_lot::Mutex;
 use vertex_tree::NONE;
+use vertex_tree::external::{Scratch, Sorter};
 
 use super::super::candidates::Parity;
 use super::super::key_counts::KeyCounts;
-use super::super::rounds::{BLOCK, Builder, block_width};
-use super::super::{leaf_radius, set_initial_quadric};
-use super::blocks::{Blocks, SPAN};
+use super::super::order::{self, PARTS, PIECES};
+use super::blocks::Blocks;
 use super::log::Log;
-use super::prepare::unscaled;
-use super::scratch::Scratch;
-use super::sort::Sorter;
+use super::pass::{Pass, Totals, Work};
 use super::window::{Ring, Whole, Window};
-
-/// What is done to the vertices of a window.
-#[derive(Clone, Copy, Debug)]
-enum Work {
-    /// Their first quadrics and candidates are found.
-    Begin,
-    /// They come up in a round with this limit.
-    Round(f32),
-    /// Those without a legal edge are looked at again.
-    Retry,
-    /// Nothing is: those into which others have merged are counted.
-    CountRoots,
-}
 
 /// The construction between passes.
 #[derive(Debug)]
@@ -36,11 +21,17 @@ pub(super) struct Passes<'a> {
     pub scratch: Scratch,
     pub blocks: Blocks,
     pub whole: Whole,
+    /// The number that the next node gets.
+    pub next_id: u32,
     pub stop: &'a AtomicBool,
-    /// Bytes of memory that a window may take, and those that a pass's nodes may take while they are sorted.
+    /// Threads that may work on a pass.
+    pub threads: usize,
+    /// Bytes of memory that all windows together may take, and those that a pass's nodes may take while they are sorted.
     pub window_bytes: u64,
     pub sort_bytes: usize,
     pub log: Log,
+    /// Vertices of the input.
+    pub numbers: u32,
     /// Vertices that have a triangle: at the start, and now.
     pub all: usize,
     pub live: usize,
@@ -52,14 +43,12 @@ pub(super) struct Passes<'a> {
     pub loaded: u64,
     /// Vertices left at the end into which others have merged.
     pub roots: usize,
-    /// How near each block is to those of the window that is being chosen.
-    pub rings: Vec<Ring>,
 }
 
 impl Passes<'_> {
     /// Finds the first quadrics and candidates.
     pub fn begin(&mut self) -> io::Result<()> {
-        self.sweep(Work::Begin)
+        self.sweep(Work::Begin).map(|_| ())
     }
 
     /// Collapses until nothing legal is left. `progress` is told the number of vertices that are left.
@@ -68,19 +57,16 @@ impl Passes<'_> {
         while !self.fits() {
             progress(self.live);
             if let Some(limit) = self.counts.limit() {
-                self.whole.first_id = self.whole.next_id;
-                let widening = block_width(self.all, self.live) / BLOCK as u32;
-                self.blocks.widen(widening * SPAN);
-                self.sweep(Work::Round(limit))?;
-                self.whole.parity = self.whole.parity.other();
-                if self.whole.next_id > self.whole.first_id {
+                self.blocks.widen(order::span(self.all, self.live));
+                if self.sweep(Work::Round(limit))? > 0 {
                     hopeless_retried = false;
                 }
+                self.whole.parity = self.whole.parity.other();
             } else if !hopeless_retried {
                 hopeless_retried = true;
                 self.sweep(Work::Retry)?;
             } else {
-                return self.sweep(Work::CountRoots);
+                return self.sweep(Work::CountRoots).map(|_| ());
             }
         }
         self.finish_in_memory(progress)
@@ -93,16 +79,17 @@ impl Passes<'_> {
     /// The rest, once all that is left fits in memory.
     fn finish_in_memory(&mut self, mut progress: impl FnMut(usize)) -> io::Result<()> {
         let list: Vec<(u32, Ring)> = (0..self.blocks.len() as u32).map(|b| (b, Ring::Inner)).collect();
-        self.whole.first_id = self.whole.next_id;
+        self.whole.first_id = self.next_id;
         self.whole.merge = self.merge_components;
-        let mut window = Window::load(&self.blocks, list, &self.whole)?;
+        let mut window = Window::load(&Mutex::new(&mut self.blocks), list, &self.whole, self.next_id)?;
         self.blocks = Blocks::new(0, self.scratch.file()?);
         window.builder.touched = None;
-        let numbers = window.numbers()[..window.vertices()].to_vec();
+        let (all_numbers, numbers) = (self.numbers, window.numbers()[..window.vertices()].to_vec());
         let originals = std::mem::take(&mut window.originals);
         let (log, scratch, stop, sort_bytes) = (&mut self.log, &self.scratch, self.stop, self.sort_bytes);
         window.builder.run(
             self.all,
+            all_numbers,
             |v| numbers[v as usize],
             |builder, nodes, limit| {
                 check(stop)?;
@@ -116,134 +103,112 @@ impl Passes<'_> {
         self.live = live.len();
         self.roots = live.iter().filter(|&&v| top[v as usize] != NONE).count();
         self.whole.live_triangles = window.builder.surface.live_triangles;
-        self.whole.next_id = window.builder.nodes.next_id;
+        self.next_id = window.builder.nodes.next_id;
         Ok(())
     }
 
-    fn sweep(&mut self, work: Work) -> io::Result<()> {
-        if !matches!(work, Work::Round(_)) {
-            // No round is under way, in which stars would have to look as they did before it.
-            self.whole.first_id = NONE;
+    /// Goes once through the mesh, in the order of a round. Returns the number of collapses.
+    fn sweep(&mut self, work: Work) -> io::Result<usize> {
+        // Outside of a round, stars are as they are.
+        self.whole.first_id = if matches!(work, Work::Round(_)) { self.next_id } else { NONE };
+        let (parts, borders) = self.split();
+        let pieces = self.blocks.len();
+        // Parts that are worked on at the same time have numbers set aside for their nodes, as many as there are vertices.
+        // In the long run that is ten for every vertex of the input: too many for the very largest.
+        let is_shared = self.threads > 1 && u64::from(self.next_id) + (self.live as u64) < u64::from(NONE);
+        let threads = if is_shared { self.threads.min(parts.len()) } else { 1 };
+        let mut next_id = self.next_id;
+        let mut tasks = Vec::new();
+        for blocks in &parts {
+            tasks.push((blocks, next_id));
+            let pieces = blocks.iter().flat_map(|b| b * PIECES..((b + 1) * PIECES).min(pieces as u32));
+            next_id += if is_shared { pieces.map(|p| self.blocks.counts(p).vertices).sum() } else { 0 };
         }
         self.blocks.begin_pass(self.scratch.file()?);
-        self.rings.clear();
-        self.rings.resize(self.blocks.len(), Ring::Outside);
-        let mut round = Sorter::new(&self.scratch, self.sort_bytes);
-        let mut start = 0;
-        while start < self.blocks.len() as u32 {
-            check(self.stop)?;
-            let (end, list) = self.choose(start);
-            start = end;
-            let mut window = Window::load(&self.blocks, list, &self.whole)?;
-            self.windows += 1;
-            self.loaded += window.vertices() as u64;
-            window.count(&mut self.counts, false);
-            self.work_on(&mut window, work);
-            let builder = &window.builder;
-            let nodes = window.loaded_nodes..builder.nodes.next();
-            self.live -= nodes.len();
-            if let Work::Round(_) = work {
-                self.log.collect(builder, nodes, |v| window.originals[v as usize], &mut round)?;
+        let totals = Totals {
+            counts: &mut self.counts,
+            log: &mut self.log,
+            round: Sorter::new(&self.scratch, self.sort_bytes),
+            windows: 0,
+            loaded: 0,
+            kept: 0,
+            collapses: 0,
+            vanished: 0,
+            roots: 0,
+        };
+        let mut pass = Pass {
+            work,
+            whole: &self.whole,
+            window_bytes: self.window_bytes / threads as u64,
+            stop: self.stop,
+            blocks: Mutex::new(&mut self.blocks),
+            totals: Mutex::new(totals),
+        };
+        let failed = AtomicBool::new(false);
+        let mut rings = vec![Ring::Outside; pieces];
+        if is_shared {
+            let tasks = Mutex::new(tasks.into_iter());
+            let next = || tasks.lock().next();
+            let run = |rings: &mut [Ring]| {
+                while let Some((blocks, first)) = next() {
+                    let outcome = pass.run(blocks, first, rings, &failed);
+                    failed.fetch_or(outcome.is_err(), Ordering::Relaxed);
+                    outcome?;
+                }
+                Ok(())
+            };
+            std::thread::scope(|scope| {
+                let helper = || run(&mut vec![Ring::Outside; pieces]);
+                let helpers: Vec<_> = (1..threads).map(|_| scope.spawn(helper)).collect();
+                let own = run(&mut rings);
+                let joined = helpers
+                    .into_iter()
+                    .map(|h| h.join().unwrap_or_else(|panic| std::panic::resume_unwind(panic)));
+                joined.fold(own, io::Result::and)
+            })?;
+        } else {
+            for (blocks, _) in tasks {
+                next_id = pass.run(blocks, next_id, &mut rings, &failed)?;
             }
-            self.whole.live_triangles = builder.surface.live_triangles;
-            self.whole.next_id = builder.nodes.next_id;
-            window.count(&mut self.counts, true);
-            let is_begun = matches!(work, Work::Begin);
-            let kept = window.store(&mut self.blocks, |s, v| !is_begun || s.spokes(v).next().is_some())?;
-            if is_begun {
+        }
+        // Nothing else is in memory now.
+        pass.window_bytes = self.window_bytes;
+        next_id = pass.run(&borders, next_id, &mut rings, &failed)?;
+        let totals = pass.totals.into_inner();
+        let (round, kept, collapses) = (totals.round, totals.kept, totals.collapses);
+        self.windows += totals.windows;
+        self.loaded += totals.loaded;
+        self.roots += totals.roots;
+        self.whole.live_triangles -= totals.vanished;
+        self.live -= collapses;
+        self.next_id = next_id;
+        match work {
+            Work::Begin => {
                 self.all += kept;
                 self.live += kept;
             }
+            Work::Round(limit) if collapses > 0 => self.log.end_round(round, limit)?,
+            _ => {}
         }
-        match work {
-            Work::Round(limit) if self.whole.next_id > self.whole.first_id => {
-                self.log.end_round(round, limit)
-            }
-            _ => Ok(()),
-        }
+        Ok(collapses)
     }
 
-    fn work_on(&mut self, window: &mut Window, work: Work) {
-        let mut neighbours = Vec::new();
-        let blocks: Vec<(u32, Range<usize>)> = window.inner().collect();
-        let builder = &mut window.builder;
-        // As many as make up a block of the rounds.
-        let same = |a: &(u32, Range<usize>), b: &(u32, Range<usize>)| {
-            a.0 / (BLOCK as u32 / SPAN) == b.0 / (BLOCK as u32 / SPAN)
-        };
-        for group in blocks.chunk_by(same) {
-            let range = match group {
-                [(_, first), .., (_, last)] => first.start..last.end,
-                [(_, only)] => only.clone(),
-                [] => continue,
-            };
-            match work {
-                Work::Begin => {
-                    for v in range {
-                        let v = v as u32;
-                        let squared = farthest(builder, v, self.whole.scale);
-                        builder.nodes.leaf_radius[v as usize] = leaf_radius(squared);
-                        set_initial_quadric(v, &mut builder.surface, &mut builder.marks, &mut neighbours);
-                        builder.candidates.refresh(v, &mut builder.surface, &mut builder.marks);
-                    }
-                }
-                Work::Round(limit) => builder.run_block(limit, self.whole.first_id, range),
-                Work::Retry => builder.retry_hopeless(range),
-                Work::CountRoots => self.roots += range.filter(|&v| builder.nodes.top[v] != NONE).count(),
+    /// The blocks of each part that are not on borders, and those that are: in pieces, ascending.
+    fn split(&self) -> (Vec<Vec<u32>>, Vec<u32>) {
+        let pieces = self.blocks.len() as u32;
+        let on_border = order::borders(pieces, |pair| {
+            for a in 0..pieces {
+                self.blocks.neighbours(a).iter().for_each(|&b| pair(a, b));
             }
+        });
+        let (mut parts, mut borders) = (vec![Vec::new(); PARTS as usize], Vec::new());
+        for (block, &on_border) in (0..).zip(&on_border) {
+            let blocks =
+                if on_border { &mut borders } else { &mut parts[order::part(block, pieces) as usize] };
+            blocks.push(block);
         }
+        (parts, borders)
     }
-
-    /// The blocks of the window whose inner ones begin at `start`, and where those end: as many as there is memory for,
-    /// but at least one block of the rounds.
-    fn choose(&mut self, start: u32) -> (u32, Vec<(u32, Ring)>) {
-        let unit = BLOCK as u32 / SPAN;
-        let count = self.blocks.len() as u32;
-        let mut list: Vec<u32> = Vec::new();
-        let (mut end, mut bytes) = (start, 0);
-        // What the last unit has changed, to be undone if it is too much.
-        let mut raised: Vec<(u32, Ring)> = Vec::new();
-        while end < count {
-            raised.clear();
-            let mut more = 0;
-            let next = (end + unit).min(count);
-            let (blocks, rings) = (&self.blocks, &mut self.rings);
-            let mut raise = |block: u32, ring: Ring| {
-                let there = rings[block as usize];
-                if there < ring {
-                    if there == Ring::Outside {
-                        more += blocks.memory(block);
-                    }
-                    raised.push((block, there));
-                    rings[block as usize] = ring;
-                }
-            };
-            for block in end..next {
-                raise(block, Ring::Inner);
-                for &near in blocks.neighbours(block) {
-                    raise(near, Ring::Near);
-                    blocks.neighbours(near).iter().for_each(|&far| raise(far, Ring::Far));
-                }
-            }
-            if end > start && bytes + more > self.window_bytes {
-                raised.iter().rev().for_each(|&(block, ring)| self.rings[block as usize] = ring);
-                break;
-            }
-            list.extend(raised.iter().filter(|r| r.1 == Ring::Outside).map(|r| r.0));
-            bytes += more;
-            end = next;
-        }
-        list.sort_unstable();
-        let list = list.into_iter().map(|b| (b, std::mem::take(&mut self.rings[b as usize]))).collect();
-        (end, list)
-    }
-}
-
-/// The squared distance to the farthest corner of the triangles around `v`, in object units.
-fn farthest(builder: &Builder, v: u32, scale: f64) -> f64 {
-    let position = |v: u32| unscaled(builder.surface.position(v), scale);
-    let corners = builder.surface.spokes(v).flat_map(|s| [s.next, s.last]);
-    corners.fold(0.0, |farthest: f64, w| farthest.max(position(v).distance_squared(position(w))))
 }
 
 /// Fails if somebody wants the construction to stop.

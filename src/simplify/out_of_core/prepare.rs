@@ -7,12 +7,11 @@ use std::io;
 
 use glam::{DVec3, Vec3};
 use vertex_tree::NONE;
+use vertex_tree::external::{Scratch, Sorter, Spool};
 
 use super::super::spatial_order::Curve;
 use super::super::{is_flat, power_of_two_above};
 use super::blocks::{Blocks, VERTEX_WORDS, Words};
-use super::scratch::{Scratch, Spool};
-use super::sort::Sorter;
 
 /// The input on disk, as it will be in the log.
 #[derive(Debug)]
@@ -50,7 +49,7 @@ impl Input {
 
     /// Diagonal of the bounding box in object units.
     pub fn extent(&self) -> f64 {
-        if self.positions.len() == 0 { 0.0 } else { (self.high.as_dvec3() - self.low.as_dvec3()).length() }
+        if self.positions.is_empty() { 0.0 } else { (self.high.as_dvec3() - self.low.as_dvec3()).length() }
     }
 }
 

@@ -2,6 +2,7 @@
 
 use std::io;
 
+use parking_lot::Mutex;
 use vertex_tree::NONE;
 
 use super::super::candidates::{Parity, State};
@@ -16,7 +17,11 @@ impl Window {
     /// interest.
     ///
     /// Returns the number of vertices that have been written in inner blocks.
-    pub fn store(&mut self, blocks: &mut Blocks, stays: impl Fn(&Surface, u32) -> bool) -> io::Result<usize> {
+    pub fn store(
+        &mut self,
+        blocks: &Mutex<&mut Blocks>,
+        stays: impl Fn(&Surface, u32) -> bool,
+    ) -> io::Result<usize> {
         let mut inner = 0;
         let mut block_of = vec![0_u32; self.originals.len()];
         for (i, ends) in self.starts.windows(2).enumerate() {
@@ -63,7 +68,7 @@ impl Window {
                 for &t in &sorted[from as usize..start[b] as usize] {
                     self.put_triangle(t, &mut words, &mut node_marks);
                 }
-                blocks.write(self.blocks[b].0, &words)?;
+                blocks.lock().write(self.blocks[b].0, &words)?;
                 if self.blocks[b].1 == Ring::Inner {
                     inner += words.vertices.len() / VERTEX_WORDS;
                 }
@@ -110,14 +115,15 @@ impl Window {
     }
 
     /// Finds anew with which blocks those near the inner ones share triangles, as far as something has changed there.
-    fn find_neighbours(&self, blocks: &mut Blocks, block_of: &[u32], changed: &[bool]) {
+    fn find_neighbours(&self, blocks: &Mutex<&mut Blocks>, block_of: &[u32], changed: &[bool]) {
         let mut neighbours = vec![Vec::new(); self.blocks.len()];
+        let span = blocks.lock().span();
         for t in self.builder.surface.triangles.iter().filter(|t| t.corners[0] != NONE) {
             let [a, b, c] = t.corners.map(|v| block_of.get(v as usize).copied());
             if a == b && b == c && a.is_some() {
                 continue;
             }
-            let of = t.corners.map(|v| blocks.of(self.number(v)));
+            let of = t.corners.map(|v| self.number(v) / span);
             for (i, block) in [a, b, c].into_iter().enumerate() {
                 let Some(block) = block else { continue };
                 let list = &mut neighbours[block as usize];
@@ -128,6 +134,7 @@ impl Window {
                 }
             }
         }
+        let mut blocks = blocks.lock();
         for (i, &(block, ring)) in self.blocks.iter().enumerate() {
             if changed[i] && ring >= Ring::Near {
                 blocks.set_neighbours(block, &mut neighbours[i]);

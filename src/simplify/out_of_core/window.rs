@@ -7,6 +7,7 @@
 use std::io;
 
 use glam::Vec3;
+use parking_lot::Mutex;
 use vertex_tree::NONE;
 
 use super::super::candidates::{Parity, State};
@@ -32,7 +33,7 @@ pub(super) enum Ring {
     Inner,
 }
 
-/// What does not change during a pass, or is counted over all windows.
+/// What does not change during a pass.
 #[derive(Clone, Debug)]
 pub(super) struct Whole {
     /// Length of a unit of the simplification in object units.
@@ -40,8 +41,7 @@ pub(super) struct Whole {
     /// Diagonal of the bounding box in object units.
     pub extent: f64,
     pub live_triangles: usize,
-    /// The number that the next node gets, and that of the first node of the current round.
-    pub next_id: u32,
+    /// The number of the first node of the current round.
     pub first_id: u32,
     pub parity: Parity,
     pub merge: bool,
@@ -64,19 +64,33 @@ pub(super) struct Window {
 }
 
 impl Window {
-    /// Reads blocks, which are ascending.
-    pub fn load(blocks: &Blocks, list: Vec<(u32, Ring)>, whole: &Whole) -> io::Result<Window> {
-        let mut parts = Parts::new(blocks, &list);
+    /// Reads blocks, which are ascending. The first new node gets the number `next_id`.
+    pub fn load(
+        blocks: &Mutex<&mut Blocks>,
+        list: Vec<(u32, Ring)>,
+        whole: &Whole,
+        next_id: u32,
+    ) -> io::Result<Window> {
+        let (mut parts, span) = {
+            let blocks = blocks.lock();
+            (Parts::new(&blocks, &list), blocks.span())
+        };
         let mut nodes = Nodes::new(Vec::new(), whole.extent);
-        (nodes.ids, nodes.next_id) = (Some(Vec::new()), whole.next_id);
+        (nodes.ids, nodes.next_id) = (Some(Vec::new()), next_id);
         let mut starts = Vec::with_capacity(list.len() + 1);
         let mut words = Vec::new();
         for &(block, _) in &list {
             starts.push(parts.numbers.len() as u32);
-            blocks.read(block, &mut words, |words, counts| parts.take(words, counts, &mut nodes))?;
+            let counts = blocks.lock().read(block, &mut words)?;
+            let mut words = words.as_slice();
+            for counts in counts {
+                let (segment, rest) = words.split_at(counts.words());
+                parts.take(segment, counts, &mut nodes);
+                words = rest;
+            }
         }
         starts.push(parts.numbers.len() as u32);
-        parts.find_slots(blocks, &list, &starts);
+        parts.find_slots(span, &list, &starts);
 
         // Those that reach out of the window have been added to the numbers, but are no vertices of it.
         let vertices = parts.numbers.len();

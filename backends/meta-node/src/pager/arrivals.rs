@@ -1,10 +1,9 @@
 //! What has been read, or could not be.
 
-use vertex_tree::{NONE, Prefetch};
+use vertex_tree::Prefetch;
 
 use super::{Holder, LONGEST_REST, Pager};
 use crate::error::MetaNodeError;
-use crate::lists::Class;
 use crate::page::Layout;
 use crate::waiting::{Command, Done};
 
@@ -44,7 +43,7 @@ impl Pager {
         self.stats.read_bytes += 4 * self.file.page_words(page) as u64;
         self.stats.ahead += u64::from(!demanded);
         self.table[page as usize] = holder;
-        self.pending -= 1;
+        self.under_way -= words.len() as u64;
         self.resident += 1;
         let touched = if demanded { self.frame } else { 0 };
         self.holders[holder as usize] =
@@ -56,16 +55,10 @@ impl Pager {
     }
 
     fn fail(&mut self, command: Command, fault: MetaNodeError) {
-        let Command { page, holder, words, .. } = command;
+        let page = command.page;
         self.stats.faults += 1;
         self.last_fault = Some(fault);
-        self.table[page as usize] = NONE;
-        self.pending -= 1;
-        let slot = &mut self.holders[holder as usize];
-        slot.words = words;
-        slot.page = NONE;
-        slot.touched = 0;
-        self.lists.push_front(holder, Class::Free);
+        self.release(&command);
         // Asked for again, but not in every frame forever.
         let failure = self.failures.entry(page).or_default();
         failure.until = self.frame + (1 << failure.times.min(63)).min(LONGEST_REST) - 1;

@@ -14,7 +14,6 @@ use vertex_tree::NONE;
 
 use super::Pager;
 use crate::lists::Class;
-use crate::settings::InUse;
 use crate::waiting::Command;
 
 /// Look this far ahead at least, and at most.
@@ -141,17 +140,17 @@ impl Pager {
             }
         }
         missing.sort_unstable();
-        // A place for what is needed now must be left, however much is under way.
-        let most = (self.allowed / 2).max(1);
+        // Room for what is needed now must be left, however much is under way.
+        let most = self.allowed / 2;
         for &(due, page) in &missing {
             if self.rests(page) {
                 continue;
             }
-            if self.pending >= most {
+            let is_full = self.under_way + self.file.page_words(page) as u64 > most;
+            if is_full || !self.make_room(page, |pager| pager.give_place(due)) {
                 break;
             }
-            let Some(holder) = self.place_until(due) else { break };
-            self.ask(page, holder, false);
+            self.ask(page, false);
         }
         self.foresight.missing = missing;
         self.foresight.asked.clear();
@@ -165,22 +164,16 @@ impl Pager {
         self.store.take_back_ahead(&mut commands);
         for command in commands.drain(..) {
             self.foresight.asked.push((command.page, command.asked));
-            let holder = self.release(command);
-            self.lists.push_front(holder, Class::Free);
+            self.release(&command);
         }
         self.foresight.asked.sort_unstable();
         self.foresight.taken_back = commands;
     }
 
-    /// A place for a page that is needed in a frame to come.
-    fn place_until(&mut self, due: u32) -> Option<u32> {
-        let place = match self.in_use {
-            InUse::Yields => self.oldest(self.frame),
-            InUse::Stays => [Class::Free, Class::Prefetched]
-                .into_iter()
-                .find_map(|class| self.takeable(class, self.frame)),
-        };
-        place.or_else(|| self.farthest(self.frame, u64::from(due)))
+    /// Makes room for a page that is needed in a frame to come.
+    fn give_place(&mut self, due: u32) -> bool {
+        let victim = self.unused().or_else(|| self.farthest(self.frame, u64::from(due)));
+        self.evict_one(victim)
     }
 
     /// Of the place holders whose pages are foreseen, the one that is needed last, if that is after a frame; not one that

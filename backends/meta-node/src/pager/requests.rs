@@ -2,41 +2,43 @@
 
 use vertex_tree::{NONE, Prefetch};
 
-use super::{AHEAD, IDLE, MOST_GIVEN_UP, PENDING, Pager, Switch};
+use super::{AHEAD, Holder, IDLE, MOST_GIVEN_UP, PENDING, Pager, Switch};
 use crate::lists::Class;
 use crate::page::Child;
 use crate::settings::InUse;
 use crate::waiting::Command;
 
 impl Pager {
-    /// Asks for every page for which there is a place.
+    /// Asks for every page for which there is room.
     pub fn load_all(&mut self) {
         for page in 0..self.file.header.pages {
             if self.table[page as usize] == NONE && !self.rests(page) {
-                let Some(holder) = self.takeable(Class::Free, self.frame) else { break };
-                self.ask(page, holder, false);
+                if !self.make_room(page, Self::give_free) {
+                    break;
+                }
+                self.ask(page, false);
             }
         }
         self.post();
     }
 
-    /// Takes back a place holder that is to be filled, with something not urgent if there is a choice.
-    pub(super) fn withdraw(&mut self, even_urgent: bool) -> Option<u32> {
+    /// Takes back a page that has been asked for, with something not urgent if there is a choice. Says whether there was
+    /// one.
+    pub(super) fn withdraw(&mut self, even_urgent: bool) -> bool {
         let at = self.outbox.iter().rposition(|command| even_urgent || !command.urgent);
-        let command = at.map(|at| self.outbox.remove(at)).or_else(|| self.store.take_back(even_urgent))?;
-        Some(self.release(command))
+        let command = at.map(|at| self.outbox.remove(at)).or_else(|| self.store.take_back(even_urgent));
+        command.inspect(|command| self.release(command)).is_some()
     }
 
-    /// A command that has been taken back gives its place holder up, which is in no list.
-    pub(super) fn release(&mut self, command: Command) -> u32 {
+    /// A command that has been taken back, or has failed, gives its place holder up.
+    pub(super) fn release(&mut self, command: &Command) {
+        let words = command.words.len() as u64;
         self.table[command.page as usize] = NONE;
-        self.pending -= 1;
-        let holder = &mut self.holders[command.holder as usize];
-        holder.words = command.words;
-        holder.page = NONE;
-        holder.touched = 0;
+        self.taken -= words;
+        self.under_way -= words;
+        self.holders[command.holder as usize].page = NONE;
+        self.empty.push(command.holder);
         self.promoted.retain(|&page| page != command.page);
-        command.holder
     }
 
     /// A node has been unfolded: the pages to which the nodes below it lead may be needed next.
@@ -78,34 +80,55 @@ impl Pager {
         self.lists.front(class).filter(is_free)
     }
 
-    /// The place holder that has not been touched for longest, and not since a frame. Empty ones count as never touched.
+    /// The place holder that has not been touched for longest, and not since a frame. One that has come ahead of time counts as never touched.
     pub(super) fn oldest(&self, before: u64) -> Option<u32> {
         let fronts = [Class::Free, Class::Prefetched, Class::InUse].map(|class| self.takeable(class, before));
         fronts.into_iter().flatten().min_by_key(|&holder| self.holders[holder as usize].touched)
     }
 
-    /// The paper's prefetching: asks for a page that is likely to be needed, if there is a place for it.
+    /// Makes room for a page, by what `give` drops each time. Says whether there is enough.
+    pub(super) fn make_room(&mut self, page: u32, mut give: impl FnMut(&mut Self) -> bool) -> bool {
+        let words = self.file.page_words(page) as u64;
+        while self.taken + words > self.allowed {
+            if !give(self) {
+                return false;
+            }
+        }
+        true
+    }
+
+    pub(super) fn evict_one(&mut self, holder: Option<u32>) -> bool {
+        holder.inspect(|&holder| self.evict(holder)).is_some()
+    }
+
+    fn give_free(&mut self) -> bool {
+        self.evict_one(self.takeable(Class::Free, self.frame))
+    }
+
+    /// The paper's prefetching: asks for a page that is likely to be needed, if there is room for it.
     pub(super) fn prefetch(&mut self, page: u32) {
         if self.how != Prefetch::Paper || self.table[page as usize] != NONE {
             return;
         }
-        if self.rests(page) {
-            return self.give_up(page);
-        }
-        let place = match self.in_use {
-            InUse::Stays => self.takeable(Class::Free, self.frame),
-            InUse::Yields => self.oldest(self.frame.saturating_sub(IDLE).max(1)),
-        };
-        match place {
-            Some(holder) => self.ask(page, holder, false),
-            None => self.give_up(page),
+        let has_room = !self.rests(page)
+            && match self.in_use {
+                InUse::Stays => self.make_room(page, Self::give_free),
+                InUse::Yields => {
+                    let before = self.frame.saturating_sub(IDLE).max(1);
+                    self.make_room(page, |pager| pager.evict_one(pager.oldest(before)))
+                }
+            };
+        if has_room {
+            self.ask(page, false);
+        } else {
+            self.give_up(page);
         }
     }
 
-    /// Asks again for what has been given up, as long as there are free places.
+    /// Asks again for what has been given up, as long as there is room.
     pub(super) fn try_again(&mut self) {
         for _ in 0..self.given_up.len() {
-            if self.takeable(Class::Free, self.frame).is_none() {
+            if self.room_for_largest() == 0 && self.takeable(Class::Free, self.frame).is_none() {
                 break;
             }
             let Some(page) = self.given_up.pop_front() else { break };
@@ -141,29 +164,43 @@ impl Pager {
         if self.rests(page) {
             return;
         }
-        match self.place(switch) {
-            Some(holder) => self.ask(page, holder, true),
-            None => self.stats.no_room += 1,
+        if self.may_switch(switch) && self.make_room(page, |pager| pager.give_way(switch)) {
+            self.ask(page, true);
+        } else {
+            self.stats.no_room += 1;
         }
     }
 
-    /// A place for an urgent request.
-    pub(super) fn place(&mut self, switch: Switch) -> Option<u32> {
-        let stays = self.in_use == InUse::Stays;
-        let not_in_use = [Class::Free, Class::Prefetched, Class::Foreseen].map(|class| self.lists.len(class));
-        if switch == Switch::Down && stays && not_in_use.iter().sum::<u32>() < 3 {
-            return None;
+    /// For how many of the largest pages there is room without dropping any.
+    fn room_for_largest(&self) -> u64 {
+        self.allowed.saturating_sub(self.taken) / u64::from(self.file.header.largest_words).max(1)
+    }
+
+    /// The three-free rule.
+    fn may_switch(&self, switch: Switch) -> bool {
+        let not_in_use = [Class::Free, Class::Prefetched, Class::Foreseen];
+        let not_in_use = not_in_use.map(|class| u64::from(self.lists.len(class))).iter().sum::<u64>();
+        switch == Switch::Up || self.in_use == InUse::Yields || not_in_use + self.room_for_largest() >= 3
+    }
+
+    /// What makes room first: a page that nobody needs, as far as is known.
+    pub(super) fn unused(&self) -> Option<u32> {
+        match self.in_use {
+            InUse::Yields => self.oldest(self.frame),
+            InUse::Stays => [Class::Free, Class::Prefetched]
+                .into_iter()
+                .find_map(|class| self.takeable(class, self.frame)),
         }
-        // What is needed now goes before all that is foreseen.
-        if !stays {
-            let oldest = self.oldest(self.frame).or_else(|| self.withdraw(false));
-            return oldest.or_else(|| self.farthest(self.frame, self.frame));
+    }
+
+    /// Makes room for an urgent request. What is needed now goes before all that is foreseen.
+    fn give_way(&mut self, switch: Switch) -> bool {
+        if self.evict_one(self.unused()) || self.withdraw(false) {
+            return true;
         }
-        let free = self.takeable(Class::Free, self.frame);
-        let place =
-            free.or_else(|| self.takeable(Class::Prefetched, self.frame)).or_else(|| self.withdraw(false));
-        let place = place.or_else(|| self.farthest(self.frame, self.frame));
-        place.or_else(|| self.takeable(Class::InUse, self.frame).filter(|_| switch == Switch::Up))
+        let farthest = self.farthest(self.frame, self.frame);
+        let is_up = switch == Switch::Up;
+        self.evict_one(farthest.or_else(|| self.takeable(Class::InUse, self.frame).filter(|_| is_up)))
     }
 
     /// Whether a page has failed so recently that it is left alone for now.
@@ -172,19 +209,23 @@ impl Pager {
             && self.failures.get(&page).is_some_and(|failure| failure.until > self.frame)
     }
 
-    pub(super) fn ask(&mut self, page: u32, holder: u32, urgent: bool) {
-        self.evict(holder);
-        self.lists.remove(holder);
-        let room = self.file.header.largest_words as usize;
-        let slot = &mut self.holders[holder as usize];
-        slot.page = page;
-        (slot.demanded, slot.ahead) = (urgent, false);
-        let mut words = std::mem::take(&mut slot.words);
-        if words.len() != room {
-            words = vec![0; room].into();
-        }
+    /// Asks for a page for which there is room.
+    pub(super) fn ask(&mut self, page: u32, urgent: bool) {
+        let words: Box<[u32]> = vec![0; self.file.page_words(page)].into();
+        self.taken += words.len() as u64;
+        self.under_way += words.len() as u64;
+        let slot = Holder { page, demanded: urgent, ..Holder::default() };
+        let holder = match self.empty.pop() {
+            Some(holder) => {
+                self.holders[holder as usize] = slot;
+                holder
+            }
+            None => {
+                self.holders.push(slot);
+                self.holders.len() as u32 - 1
+            }
+        };
         self.table[page as usize] = PENDING | holder;
-        self.pending += 1;
         let asked = self.foresight.asked_before(page).unwrap_or(self.frame);
         self.outbox.push(Command { page, holder, words, urgent, asked });
     }

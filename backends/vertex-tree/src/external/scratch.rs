@@ -1,26 +1,35 @@
 //! Temporary files, and records in them that are written and read in sequence.
-//!
-//! The files have no name, or lose it as soon as they are open: whatever ends the program, the system takes them away.
 
 use std::fs::File;
 use std::io::{self, Read, Seek, SeekFrom, Write};
+use std::ops::Range;
 use std::path::PathBuf;
 
+use super::Paged;
+
 /// Bytes that are written or read at a time.
-pub(super) const BUFFER_BYTES: usize = 1 << 18;
+const BUFFER_BYTES: usize = 1 << 18;
 
 /// Where temporary files are made.
 #[derive(Clone, Debug)]
-pub(super) struct Scratch {
+pub struct Scratch {
+    /// The folder.
     pub folder: PathBuf,
 }
 
 impl Scratch {
+    /// An empty file.
+    ///
+    /// # Errors
+    /// What the operating system says.
     pub fn file(&self) -> io::Result<File> {
         tempfile::tempfile_in(&self.folder)
     }
 
     /// The beginning of a sequence of records.
+    ///
+    /// # Errors
+    /// What the operating system says.
     pub fn spool<const N: usize>(&self) -> io::Result<Spool<N>> {
         Ok(Spool { file: self.file()?, buffer: Vec::new(), len: 0 })
     }
@@ -28,7 +37,7 @@ impl Scratch {
 
 /// Records of `N` words, written one after the other.
 #[derive(Debug)]
-pub(super) struct Spool<const N: usize> {
+pub struct Spool<const N: usize> {
     file: File,
     buffer: Vec<[u32; N]>,
     len: u64,
@@ -37,10 +46,20 @@ pub(super) struct Spool<const N: usize> {
 impl<const N: usize> Spool<N> {
     const RECORDS: usize = BUFFER_BYTES / (4 * N);
 
+    /// How many there are.
     pub fn len(&self) -> u64 {
         self.len
     }
 
+    /// Whether there is none.
+    pub fn is_empty(&self) -> bool {
+        self.len == 0
+    }
+
+    /// Writes one more.
+    ///
+    /// # Errors
+    /// What the operating system says.
     pub fn push(&mut self, record: [u32; N]) -> io::Result<()> {
         self.buffer.push(record);
         self.len += 1;
@@ -55,6 +74,9 @@ impl<const N: usize> Spool<N> {
     }
 
     /// The record with a number, also while more are being written.
+    ///
+    /// # Errors
+    /// What the operating system says.
     pub fn get(&mut self, number: u64) -> io::Result<[u32; N]> {
         let written = self.len - self.buffer.len() as u64;
         if let Some(record) = number.checked_sub(written).and_then(|i| self.buffer.get(i as usize)) {
@@ -67,23 +89,39 @@ impl<const N: usize> Spool<N> {
     }
 
     /// Reads all records from the first on.
+    ///
+    /// # Errors
+    /// What the operating system says.
     pub fn read(&mut self) -> io::Result<Reader<'_, N>> {
         self.flush()?;
-        Ok(Reader::new(&self.file, 0, self.len, Self::RECORDS))
+        Ok(Reader::new(&self.file, 0, 0..self.len, Self::RECORDS))
+    }
+
+    /// Reads all records from the last on.
+    ///
+    /// # Errors
+    /// What the operating system says.
+    pub fn read_back(&mut self) -> io::Result<BackReader<'_, N>> {
+        self.flush()?;
+        Ok(BackReader::new(&self.file, 0, self.len))
     }
 
     /// Reads records by number, and keeps those of about so many bytes in memory.
+    ///
+    /// # Errors
+    /// What the operating system says.
     pub fn into_paged(mut self, bytes: usize) -> io::Result<Paged<N>> {
         self.flush()?;
-        let slots = (bytes / (4 * N * Paged::<N>::PAGE)).max(2);
-        Ok(Paged { file: self.file, len: self.len, pages: vec![None; slots] })
+        Ok(Paged::new(self.file, self.len, bytes))
     }
 }
 
 /// A sequence of records that is being read.
 #[derive(Debug)]
-pub(super) struct Reader<'f, const N: usize> {
+pub struct Reader<'f, const N: usize> {
     file: &'f File,
+    /// Where the first record of all is, in bytes.
+    base: u64,
     /// Number of the record that follows those in the buffer, and of the one after the last.
     at: u64,
     end: u64,
@@ -93,9 +131,18 @@ pub(super) struct Reader<'f, const N: usize> {
 }
 
 impl<'f, const N: usize> Reader<'f, N> {
-    /// The records `at..end` of a file, so many at a time.
-    pub fn new(file: &'f File, at: u64, end: u64, records: usize) -> Self {
-        Reader { file, at, end, buffer: Vec::new(), next: 0, records: records.max(1) }
+    /// Records of a file, of which the first is at byte `base`, so many at a time.
+    #[must_use]
+    pub fn new(file: &'f File, base: u64, which: Range<u64>, records: usize) -> Self {
+        Reader {
+            file,
+            base,
+            at: which.start,
+            end: which.end,
+            buffer: Vec::new(),
+            next: 0,
+            records: records.max(1),
+        }
     }
 
     fn fill(&mut self) -> io::Result<()> {
@@ -103,7 +150,7 @@ impl<'f, const N: usize> Reader<'f, N> {
         self.buffer.resize(count, [0; N]);
         self.next = 0;
         let mut file = self.file;
-        file.seek(SeekFrom::Start(self.at * 4 * N as u64))?;
+        file.seek(SeekFrom::Start(self.base + self.at * 4 * N as u64))?;
         file.read_exact(bytemuck::cast_slice_mut(self.buffer.as_flattened_mut()))?;
         self.at += count as u64;
         Ok(())
@@ -130,35 +177,40 @@ impl<const N: usize> Iterator for Reader<'_, N> {
     }
 }
 
-/// Records that are read by number. Neighbours in the file are read together, since those who ask for one mostly ask
-/// for others near it.
+/// A sequence of records that is being read from its end.
 #[derive(Debug)]
-pub(super) struct Paged<const N: usize> {
-    file: File,
-    len: u64,
-    /// Each page has one place where it can be, given by its number.
-    pages: Vec<Option<(u64, Vec<[u32; N]>)>>,
+pub struct BackReader<'f, const N: usize> {
+    file: &'f File,
+    base: u64,
+    /// How many records come before those in the buffer.
+    before: u64,
+    buffer: Vec<[u32; N]>,
 }
 
-impl<const N: usize> Paged<N> {
-    /// Records of a page.
-    const PAGE: usize = 4096 / (4 * N);
+impl<'f, const N: usize> BackReader<'f, N> {
+    /// The first so many records of a file, of which the first is at byte `base`.
+    #[must_use]
+    pub fn new(file: &'f File, base: u64, count: u64) -> Self {
+        BackReader { file, base, before: count, buffer: Vec::new() }
+    }
+}
 
-    pub fn get(&mut self, number: u64) -> io::Result<[u32; N]> {
-        let (page, within) = (number / Self::PAGE as u64, (number % Self::PAGE as u64) as usize);
-        let slots = self.pages.len() as u64;
-        let slot = &mut self.pages[(page % slots) as usize];
-        if slot.as_ref().is_none_or(|(there, _)| *there != page) {
-            let start = page * Self::PAGE as u64;
-            let count = self.len.saturating_sub(start).min(Self::PAGE as u64) as usize;
-            let (_, mut records) = slot.take().unwrap_or_default();
-            records.resize(count, [0; N]);
-            self.file.seek(SeekFrom::Start(start * 4 * N as u64))?;
-            self.file.read_exact(bytemuck::cast_slice_mut(records.as_flattened_mut()))?;
-            *slot = Some((page, records));
+impl<const N: usize> Iterator for BackReader<'_, N> {
+    type Item = io::Result<[u32; N]>;
+
+    fn next(&mut self) -> Option<Self::Item> {
+        if self.buffer.is_empty() && self.before > 0 {
+            let count = self.before.min(Spool::<N>::RECORDS as u64);
+            let start = self.before - count;
+            let mut reader = Reader::new(self.file, self.base, start..self.before, count as usize);
+            self.before = start;
+            if let Err(error) = reader.fill() {
+                self.before = 0;
+                return Some(Err(error));
+            }
+            self.buffer = reader.buffer;
         }
-        let record = slot.as_ref().and_then(|(_, records)| records.get(within));
-        record.copied().ok_or_else(|| io::ErrorKind::UnexpectedEof.into())
+        self.buffer.pop().map(Ok)
     }
 }
 
@@ -180,6 +232,8 @@ mod tests {
         assert_eq!(spool.len(), u64::from(count));
         let read: Vec<u32> = spool.read().unwrap().map(|r| r.unwrap()[0]).collect();
         assert!(read.iter().copied().eq(0..count));
+        let back: Vec<u32> = spool.read_back().unwrap().map(|r| r.unwrap()[0]).collect();
+        assert!(back.iter().copied().eq((0..count).rev()));
         let mut paged = spool.into_paged(20_000).unwrap();
         for i in (0..count).step_by(997).chain((0..count).rev().step_by(101)) {
             assert_eq!(paged.get(u64::from(i)).unwrap(), [i, i * 2, 5]);

@@ -1,6 +1,6 @@
 //! Sorting of more records than fit in memory: sorted runs on disk, merged with a heap.
 //!
-//! Records are arrays of words and sort as such. Runs are as long as the memory that is given; with more than
+//! Records are arrays of words and sort as such. Runs are half as long as the memory that is given; with more than
 //! [`MOST_RUNS`] of them, which takes an input several thousand times as large as memory, groups are merged first.
 
 use std::cmp::Reverse;
@@ -9,14 +9,17 @@ use std::collections::binary_heap::PeekMut;
 use std::fs::File;
 use std::io::{self, Write};
 
-use super::scratch::{Reader, Scratch};
+use super::{Reader, Scratch};
 
 /// Runs that are merged at a time.
 const MOST_RUNS: usize = 1024;
 
+/// Fewer records than this are sorted sooner than a thread starts.
+const FEW: usize = 1 << 14;
+
 /// Records on the way to being sorted.
 #[derive(Debug)]
-pub(super) struct Sorter<const N: usize> {
+pub struct Sorter<const N: usize> {
     scratch: Scratch,
     buffer: Vec<[u32; N]>,
     /// Records that are sorted at a time.
@@ -28,11 +31,16 @@ pub(super) struct Sorter<const N: usize> {
 
 impl<const N: usize> Sorter<N> {
     /// `bytes` is the memory to use.
+    #[must_use]
     pub fn new(scratch: &Scratch, bytes: usize) -> Self {
         let most = (bytes / (4 * N)).max(MOST_RUNS);
         Sorter { scratch: scratch.clone(), buffer: Vec::new(), most, file: None, ends: Vec::new() }
     }
 
+    /// Takes one more record.
+    ///
+    /// # Errors
+    /// What the operating system says.
     pub fn push(&mut self, record: [u32; N]) -> io::Result<()> {
         if self.buffer.capacity() == 0 {
             // Small inputs take little; a vector that grows would take half as much again when it does.
@@ -48,19 +56,40 @@ impl<const N: usize> Sorter<N> {
         Ok(())
     }
 
+    /// Writes what there is as two runs, each sorted by a thread.
     fn write_run(&mut self) -> io::Result<()> {
-        self.buffer.sort_unstable();
         let file = match &mut self.file {
             Some(file) => file,
             none => none.insert(self.scratch.file()?),
         };
-        file.write_all(bytemuck::cast_slice(self.buffer.as_flattened()))?;
-        self.ends.push(self.ends.last().copied().unwrap_or(0) + self.buffer.len() as u64);
+        let mut start = self.ends.last().copied().unwrap_or(0);
+        let middle = self.buffer.len() / 2;
+        let (first, second) = self.buffer.split_at_mut(middle);
+        if first.len() < FEW {
+            first.sort_unstable();
+            second.sort_unstable();
+        } else {
+            // A panic of the helper is passed on when the scope ends.
+            std::thread::scope(|scope| {
+                scope.spawn(|| first.sort_unstable());
+                second.sort_unstable();
+            });
+        }
+        for run in [&*first, &*second] {
+            if !run.is_empty() {
+                file.write_all(bytemuck::cast_slice(run.as_flattened()))?;
+                start += run.len() as u64;
+                self.ends.push(start);
+            }
+        }
         self.buffer.clear();
         Ok(())
     }
 
     /// Calls `take` with all records in order.
+    ///
+    /// # Errors
+    /// What the operating system or `take` says.
     pub fn finish(mut self, mut take: impl FnMut([u32; N]) -> io::Result<()>) -> io::Result<()> {
         if self.file.is_none() {
             self.buffer.sort_unstable();
@@ -103,7 +132,7 @@ fn merge<const N: usize>(
     let mut readers = Vec::with_capacity(ends.len());
     let mut heap = BinaryHeap::with_capacity(ends.len());
     for &end in ends {
-        let mut reader = Reader::new(file, start, end, records.min(1 << 16));
+        let mut reader = Reader::new(file, 0, start..end, records.min(1 << 16));
         start = end;
         if let Some(record) = reader.next() {
             heap.push(Reverse((record?, readers.len())));
