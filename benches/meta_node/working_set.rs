@@ -71,6 +71,9 @@ pub fn table() {
     }
 }
 
+/// Calls its second argument with pages that a node is to be counted on.
+type PagesOf<'a> = dyn Fn(NodeId, &mut dyn FnMut(u32)) + 'a;
+
 fn trace(
     file: &std::sync::Arc<MetaNodeFile>,
     views: &[View],
@@ -104,7 +107,7 @@ fn trace(
         trace.frames.resize(frame as usize, Vec::new());
         if frame % 10 == 0 {
             let is_active = |node: NodeId| active[node.index()] == frame;
-            let mut count = |mark: u32, f: &dyn Fn(NodeId, &mut dyn FnMut(u32))| {
+            let mut count = |mark: u32, f: &PagesOf| {
                 let mut count = 0;
                 for &node in &now {
                     f(node, &mut |page| {
