@@ -7,13 +7,16 @@
 
 use std::path::PathBuf;
 
-use foldfront::compare::{Options, Subject};
+use foldfront::compare::{Options, Pace, Subject};
 use foldfront::criterion::Criterion;
 use foldfront::output;
 use foldfront::path;
 use foldfront::report::{Report, Section};
 use foldfront::scene::{Scene, SceneKind};
 use foldfront::simplify;
+use foldfront::store::Backend;
+
+const COMMAND: &str = "cargo bench --bench selection_time";
 
 fn main() {
     let folder = PathBuf::from(env!("CARGO_TARGET_TMPDIR")).join("../selection_time");
@@ -43,11 +46,11 @@ fn main() {
                     subject.replay(&walk, frames, &options, quiet).expect("nothing can fail in memory"),
                 );
             }
-            let section = Section { name, facts: Vec::new(), runs, pictures: Vec::new() };
+            let section = Section::new(&name, Backend::InMemory, runs);
             let file = folder.join(format!("{}-{setting}.svg", kind.name()));
-            output::write(&file, section.curves().expect("curves can be drawn").as_bytes())
+            output::write(&file, section.curves(COMMAND).expect("curves can be drawn").as_bytes())
                 .expect("target is writable");
-            let report = Report { command: String::new(), sections: vec![section] };
+            let report = Report { command: COMMAND.to_owned(), pace: Pace::Settled, sections: vec![section] };
             println!("{}\n{}", report.to_text(), file.display());
         }
     }

@@ -73,6 +73,42 @@ impl BruteForce {
         differs.iter().filter(|&&differs| differs).count() as u64
     }
 
+    /// Like [`wrong`](Self::wrong), for a frame in which changes were refused: those only that this does not explain. A node
+    /// that was not unfolded keeps folded what is below it, and one that was not folded keeps active what is above it.
+    /// Where the backend has dependencies beyond structure, a boundary node may have waited for another one: then nodes
+    /// that are wrongly folded are explained by any refusal.
+    pub fn unexplained<T: VertexTree, M: MeshSink>(
+        &mut self,
+        engine: &Engine<T, M>,
+        has_dependencies: bool,
+    ) -> u64 {
+        self.cut(engine.settings(), engine.views());
+        let mut is_active = vec![false; self.nodes.len()];
+        engine.for_each_active(|node| is_active[self.places[node.index()] as usize] = true);
+        let mut is_missing = vec![false; self.nodes.len()];
+        for node in engine.missing() {
+            is_missing[self.places[node.index()] as usize] = true;
+        }
+        let mut waits = is_missing.clone();
+        let mut unexplained = 0;
+        for (at, node) in self.nodes.iter().enumerate() {
+            // Parents come first.
+            waits[at] |=
+                node.parents.iter().any(|&parent| waits[parent as usize] && !is_active[parent as usize]);
+            let is_late = waits[at] || has_dependencies;
+            unexplained += u64::from(self.active[at] && !is_active[at] && !is_late);
+        }
+        let mut holds = is_missing;
+        for (at, node) in self.nodes.iter().enumerate().rev() {
+            let is_held = holds[at] && is_active[at];
+            if is_held {
+                node.parents.iter().for_each(|&parent| holds[parent as usize] = true);
+            }
+            unexplained += u64::from(!self.active[at] && is_active[at] && !is_held);
+        }
+        unexplained
+    }
+
     /// Tests every node and closes upwards; returns the hash and the size of the cut.
     fn cut(&mut self, settings: &Settings, views: &[View]) -> (u64, usize) {
         let criterion = settings.criterion;

@@ -1,7 +1,9 @@
 //! The experiment runner: one hierarchy, in whatever backend, one path, every strategy.
 //!
-//! Replays are *settled*: a backend that pages is waited for within each change, so that cuts can be compared frame by
-//! frame; what remains is what it can not do in the memory that it has.
+//! Replays are *settled* by default: a backend that pages is waited for within each change, so that cuts can be compared
+//! frame by frame; what remains is what it can not do in the memory that it has. In real time the clock runs instead, and
+//! a page that has not come is a miss: on virtual time with a simulated store, so that a replay can be repeated, or by the
+//! wall clock with the store that is there. See [`Pace`]. A viewer waits for the first frame, so that is settled too.
 //!
 //! Each strategy replays the path alone, from the base mesh on, with the displayed mesh kept as a renderer would;
 //! nothing else runs between its frames, and the first frame, which unfolds the whole cut, counts like any other.
@@ -9,16 +11,20 @@
 //! replay.
 
 pub mod csv;
+mod replay;
 
 use std::ops::Range;
 use std::sync::Arc;
+use std::time::Duration;
 
 use detail_block::XfmTree;
 use in_memory::{Hierarchy, InMemoryTree};
 use meta_node::{Dependencies, MetaNodeTree};
 use mt_partition::{CacheMode, Memory, MtTree};
-use vertex_tree::{CollapseLog, LogError, Mesh, NullSink, TreeError, VertexTree};
+use vertex_tree::simulated::Simulated;
+use vertex_tree::{CollapseLog, LogError, Mesh, NullSink, Prefetch, TreeError, VertexTree};
 
+use self::replay::Replay;
 use crate::active_mesh::ActiveMesh;
 use crate::brute_force::{BruteForce, unfold_all};
 use crate::budget::{Budget, WorkCap};
@@ -56,6 +62,22 @@ pub struct Options {
     pub check: bool,
     /// What backends may use.
     pub paging: Paging,
+    /// What fetches pages ahead, each in a replay of its own.
+    pub prefetch: Vec<Prefetch>,
+    /// How time passes.
+    pub pace: Pace,
+}
+
+/// How time passes in a replay.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub enum Pace {
+    /// Each frame waits until it has all that it asks for.
+    #[default]
+    Settled,
+    /// So much virtual time passes from frame to frame, for a simulated store too.
+    Simulated(Duration, Simulated),
+    /// Frames come so much time after each other, and the store is the real one.
+    WallClock(Duration),
 }
 
 /// What a backend that pages may use, and how.
@@ -71,11 +93,20 @@ pub struct Paging {
     pub dependencies: Dependencies,
 }
 
-impl Default for Paging {
+impl Paging {
     /// Memory for everything.
+    pub const UNLIMITED: Self = Self {
+        page_memory: u64::MAX,
+        soft_quota: u64::MAX,
+        cache: CacheMode::PC,
+        dependencies: Dependencies::Off,
+    };
+}
+
+impl Default for Paging {
+    /// [`Paging::UNLIMITED`].
     fn default() -> Self {
-        let (cache, dependencies) = (CacheMode::default(), Dependencies::default());
-        Self { page_memory: u64::MAX, soft_quota: u64::MAX, cache, dependencies }
+        Self::UNLIMITED
     }
 }
 
@@ -93,6 +124,8 @@ impl Default for Options {
             omega: None,
             check: false,
             paging: Paging::default(),
+            prefetch: vec![Prefetch::Paper],
+            pace: Pace::Settled,
         }
     }
 }
@@ -120,7 +153,7 @@ pub struct Run {
     /// How the nodes that must change were found.
     pub strategy: Strategy,
     /// What fetched pages ahead.
-    pub prefetch: &'static str,
+    pub prefetch: Prefetch,
     /// Declared speed.
     pub speed: Speed,
     /// The frames.
@@ -232,41 +265,79 @@ enum Check {
     Nodes(BruteForce),
 }
 
-/// Calls a generic function with a way to open trees of the subject's backend, settled.
+/// How trees are opened.
+#[derive(Clone, Copy)]
+struct Opening {
+    paging: Paging,
+    prefetch: Prefetch,
+    pace: Pace,
+}
+
+impl Opening {
+    /// With memory for everything, and time.
+    const SETTLED: Self = Self { paging: Paging::UNLIMITED, prefetch: Prefetch::None, pace: Pace::Settled };
+
+    fn simulated(&self) -> Option<Simulated> {
+        match self.pace {
+            Pace::Simulated(_, store) => Some(store),
+            Pace::Settled | Pace::WallClock(_) => None,
+        }
+    }
+
+    fn meta_node(&self) -> meta_node::Settings {
+        let Paging { page_memory, dependencies, .. } = self.paging;
+        let io = self.simulated().map_or(meta_node::Io::Thread, meta_node::Io::Simulated);
+        meta_node::Settings { page_memory, dependencies, prefetch: self.prefetch, io, ..Default::default() }
+    }
+
+    fn detail_block(&self) -> detail_block::Settings {
+        let Paging { page_memory: hard_quota, soft_quota, .. } = self.paging;
+        let soft_quota = soft_quota.min(hard_quota);
+        let io = self.simulated().map_or(detail_block::Io::Background, detail_block::Io::Simulated);
+        detail_block::Settings { soft_quota, hard_quota, prefetch: self.prefetch, io, ..Default::default() }
+    }
+
+    fn mt_partition(&self) -> mt_partition::Settings {
+        let Paging { page_memory, cache, .. } = self.paging;
+        let reader = self.simulated().map(mt_partition::Reader::simulated);
+        mt_partition::Settings { cache, memory: Memory::new(page_memory), reader, prefetch: self.prefetch }
+    }
+
+    fn wrap<T: VertexTree>(&self, tree: T) -> Settled<T> {
+        match self.pace {
+            Pace::Settled => Settled::new(tree),
+            Pace::Simulated(..) | Pace::WallClock(_) => Settled::in_real_time(tree),
+        }
+    }
+}
+
+/// Calls a generic function with a way to open trees of the subject's backend.
 macro_rules! with_trees {
-    ($subject:expr, $paging:expr, |$open:ident| $body:expr) => {{
-        let (subject, paging): (&Subject, Paging) = ($subject, $paging);
+    ($subject:expr, |$open:ident| $body:expr) => {{
+        let subject: &Subject = $subject;
         match &subject.store {
             Store::InMemory(hierarchy, _) => {
-                let $open = || Ok(InMemoryTree::new(hierarchy.clone()));
+                let $open = |opening: Opening| Ok(opening.wrap(InMemoryTree::new(hierarchy.clone())));
                 $body
             }
             Store::MetaNode(file) => {
-                let Paging { page_memory, dependencies, .. } = paging;
-                let settings = meta_node::Settings { page_memory, dependencies, ..Default::default() };
-                let $open = || {
-                    let tree = MetaNodeTree::new(file.clone(), settings);
-                    tree.map(Settled::new).map_err(|e| subject.store_error(e.into()))
+                let $open = |opening: Opening| {
+                    let tree = MetaNodeTree::new(file.clone(), opening.meta_node());
+                    tree.map(|tree| opening.wrap(tree)).map_err(|e| subject.store_error(e.into()))
                 };
                 $body
             }
             Store::DetailBlock(file) => {
-                let (soft_quota, hard_quota) =
-                    (paging.soft_quota.min(paging.page_memory), paging.page_memory);
-                let settings = detail_block::Settings { soft_quota, hard_quota, ..Default::default() };
-                let $open = || {
-                    let tree = XfmTree::new(file.clone(), settings);
-                    tree.map(Settled::new).map_err(|e| subject.store_error(e.into()))
+                let $open = |opening: Opening| {
+                    let tree = XfmTree::new(file.clone(), opening.detail_block());
+                    tree.map(|tree| opening.wrap(tree)).map_err(|e| subject.store_error(e.into()))
                 };
                 $body
             }
             Store::MtPartition(file) => {
-                let $open = || {
-                    let memory = Memory::new(paging.page_memory);
-                    let settings =
-                        mt_partition::Settings { cache: paging.cache, memory, ..Default::default() };
-                    let tree = MtTree::new(file.clone(), settings);
-                    tree.map(Settled::new).map_err(|e| subject.store_error(e.into()))
+                let $open = |opening: Opening| {
+                    let tree = MtTree::new(file.clone(), opening.mt_partition());
+                    tree.map(|tree| opening.wrap(tree)).map_err(|e| subject.store_error(e.into()))
                 };
                 $body
             }
@@ -292,10 +363,31 @@ impl Subject {
         Self { name: name.to_owned(), store, check: None }
     }
 
+    /// What it is called.
+    #[must_use]
+    pub fn name(&self) -> &str {
+        &self.name
+    }
+
+    /// Triangles of the input.
+    #[must_use]
+    pub fn triangles(&self) -> u64 {
+        self.store.triangles()
+    }
+
     /// Where the hierarchy is kept.
     #[must_use]
     pub fn backend(&self) -> Backend {
         self.store.backend()
+    }
+
+    /// Whether a node may wait for one that is neither above nor below it.
+    fn has_dependencies(&self, paging: &Paging) -> bool {
+        match self.backend() {
+            Backend::InMemory | Backend::MtPartition => false,
+            Backend::MetaNode => paging.dependencies != Dependencies::Off,
+            Backend::DetailBlock => true,
+        }
     }
 
     fn store_error(&self, source: StoreError) -> CompareError {
@@ -315,12 +407,34 @@ impl Subject {
         let Options { criterion, normal_cone, .. } = *options;
         let settings = Settings { strategy, criterion, normal_cone, ..Settings::default() };
         let view = View::new(&path.camera(frame), options.theta);
-        with_trees!(self, options.paging, |open| {
+        with_trees!(self, |open| {
+            let opening = Opening { paging: options.paging, ..Opening::SETTLED };
             let mut engine =
-                Engine::new(open()?, ActiveMesh::new(), settings).map_err(|e| self.tree_error(e))?;
+                Engine::new(open(opening)?, ActiveMesh::new(), settings).map_err(|e| self.tree_error(e))?;
             engine.advance(&[view]).map_err(|e| self.tree_error(e))?;
             Ok(engine.mesh().to_mesh())
         })
+    }
+
+    /// Bytes of the hierarchy that the cut of a frame takes in memory, on the way straight from the base mesh to it. The
+    /// largest of some frames.
+    ///
+    /// # Errors
+    /// [`CompareError::Store`], [`CompareError::Tree`].
+    pub fn needs(&self, path: &Path, frames: &[usize], options: &Options) -> Result<u64, CompareError> {
+        let settings =
+            Settings { strategy: Strategy::TopDown, criterion: options.criterion, ..Settings::default() };
+        let mut most = 0;
+        for &frame in frames {
+            let view = View::new(&path.camera(frame), options.theta);
+            with_trees!(self, |open| {
+                let tree = open(Opening { paging: options.paging, ..Opening::SETTLED })?;
+                let mut engine = Engine::new(tree, NullSink, settings).map_err(|e| self.tree_error(e))?;
+                let report = engine.advance(&[view]).map_err(|e| self.tree_error(e))?;
+                most = most.max(report.pages.resident_bytes);
+            });
+        }
+        Ok(most)
     }
 
     /// The mesh with everything unfolded: the input, as the backend gives it back.
@@ -332,8 +446,8 @@ impl Subject {
             return Ok(log.mesh.clone());
         }
         let mut mesh = ActiveMesh::new();
-        with_trees!(self, Paging::default(), |open| {
-            let mut tree = open()?;
+        with_trees!(self, |open| {
+            let mut tree = open(Opening::SETTLED)?;
             tree.base_mesh(&mut mesh).map_err(|e| self.tree_error(e))?;
             unfold_all(&mut tree, &mut mesh, |_, _| {}).map_err(|e| self.tree_error(e))?;
         });
@@ -347,14 +461,14 @@ impl Subject {
                 .map(Check::Log)
                 .map_err(|source| CompareError::Log { scene: self.name.clone(), source });
         }
-        with_trees!(self, Paging::default(), |open| {
-            let mut tree = open()?;
+        with_trees!(self, |open| {
+            let mut tree = open(Opening::SETTLED)?;
             tree.base_mesh(&mut NullSink).map_err(|e| self.tree_error(e))?;
             BruteForce::new(&mut tree).map(Check::Nodes).map_err(|e| self.tree_error(e))
         })
     }
 
-    /// Replays `frames` of a path with every strategy of the options. `progress` counts frames.
+    /// Replays `frames` of a path with every strategy and every way to prefetch of the options. `progress` counts frames.
     ///
     /// # Errors
     /// [`CompareError::Store`], [`CompareError::Tree`], and [`CompareError::Wrong`] or [`CompareError::Differs`] where the
@@ -366,16 +480,19 @@ impl Subject {
         options: &Options,
         progress: Progress,
     ) -> Result<Vec<Run>, CompareError> {
-        let is_checked = |s: Strategy| options.check || !s.is_exact();
         let mut check = self.check.take();
-        if check.is_none() && options.strategies.iter().any(|&s| is_checked(s)) {
+        if check.is_none() && options.check {
             check = Some(self.new_check()?);
         }
+        let is_checked = |s: Strategy| options.check || !s.is_exact();
         let speed = declared_speed(path, options);
         let views: Vec<View> =
             frames.clone().map(|frame| View::new(&path.camera(frame), options.theta)).collect();
+        // Without pages there is nothing to fetch.
+        let prefetch =
+            if self.backend() == Backend::InMemory { &[Prefetch::None][..] } else { &options.prefetch };
         let replays = options.strategies.iter().map(|&s| 1 + usize::from(is_checked(s))).sum::<usize>();
-        let total = (replays * views.len()) as u64;
+        let total = (prefetch.len() * replays * views.len()) as u64;
         let mut done = 0;
         let mut count = || {
             done += 1;
@@ -383,106 +500,45 @@ impl Subject {
         };
 
         let mut runs: Vec<Run> = Vec::new();
-        for &strategy in &options.strategies {
-            let settings = Settings {
-                strategy,
-                criterion: options.criterion,
-                normal_cone: options.normal_cone,
-                rho: speed.rho,
-                omega: speed.omega,
-                budget: options.budget,
-                work_cap: options.work_cap,
-            };
-            let replay = Replay { subject: self, path, frames: frames.clone(), views: &views, settings };
-            let rows = with_trees!(self, options.paging, |open| {
-                let mut rows = replay.measure(open()?, &mut count)?;
-                if let Some(check) = check.as_mut().filter(|_| is_checked(strategy)) {
-                    replay.check(open()?, check, &mut rows, &mut count)?;
-                }
-                rows
-            });
-            runs.push(Run {
-                scene: self.name.clone(),
-                path: path.name.clone(),
-                backend: self.backend().name(),
-                strategy,
-                prefetch: if self.backend() == Backend::InMemory { "none" } else { "paper" },
-                speed,
-                rows,
-            });
+        for &prefetch in prefetch {
+            let opening = Opening { paging: options.paging, prefetch, pace: options.pace };
+            for &strategy in &options.strategies {
+                let settings = Settings {
+                    strategy,
+                    criterion: options.criterion,
+                    normal_cone: options.normal_cone,
+                    rho: speed.rho,
+                    omega: speed.omega,
+                    budget: options.budget,
+                    work_cap: options.work_cap,
+                };
+                let frames = frames.clone();
+                let replay = Replay { subject: self, path, frames, views: &views, settings, opening };
+                let rows = with_trees!(self, |open| {
+                    let mut rows = replay.measure(open(opening)?, &mut count)?;
+                    match check.as_mut() {
+                        _ if !is_checked(strategy) => {}
+                        Some(check) => replay.check(open(opening)?, check, &mut rows, &mut count)?,
+                        None => {
+                            let beside = open(Opening { paging: options.paging, ..Opening::SETTLED })?;
+                            replay.compare(open(opening)?, beside, &mut rows, &mut count)?;
+                        }
+                    }
+                    rows
+                });
+                runs.push(Run {
+                    scene: self.name.clone(),
+                    path: path.name.clone(),
+                    backend: self.backend().name(),
+                    strategy,
+                    prefetch,
+                    speed,
+                    rows,
+                });
+            }
         }
         self.check = check;
         Ok(runs)
-    }
-}
-
-/// One strategy along one path.
-struct Replay<'a> {
-    subject: &'a Subject,
-    path: &'a Path,
-    frames: Range<usize>,
-    views: &'a [View],
-    settings: Settings,
-}
-
-impl Replay<'_> {
-    fn measure<T: VertexTree>(&self, tree: T, count: &mut impl FnMut()) -> Result<Vec<Row>, CompareError> {
-        let wrap = |e| self.subject.tree_error(e);
-        let mut engine = Engine::new(tree, ActiveMesh::new(), self.settings).map_err(wrap)?;
-        let mut rows = Vec::with_capacity(self.views.len());
-        for (frame, view) in self.frames.clone().zip(self.views) {
-            let report = engine.advance(std::slice::from_ref(view)).map_err(wrap)?;
-            engine.mesh_mut().clear_changes();
-            rows.push(Row { frame, report, wrong: None });
-            count();
-        }
-        Ok(rows)
-    }
-
-    fn check<T: VertexTree>(
-        &self,
-        tree: T,
-        check: &mut Check,
-        rows: &mut [Row],
-        count: &mut impl FnMut(),
-    ) -> Result<(), CompareError> {
-        let wrap = |e| self.subject.tree_error(e);
-        let mut engine = Engine::new(tree, NullSink, self.settings).map_err(wrap)?;
-        for (row, view) in rows.iter_mut().zip(self.views) {
-            let report = engine.advance(std::slice::from_ref(view)).map_err(wrap)?;
-            // What is carried over, blocked or has no room is not wrong, it is late.
-            let is_late = report.carried + report.blocked + report.misses > 0;
-            let is_exact = self.settings.strategy.is_exact() && !is_late;
-            let (scene, path) = (self.subject.name.clone(), self.path.name.clone());
-            match check {
-                Check::Log(oracle) => {
-                    let difference = oracle.compare(&engine);
-                    row.wrong = Some(difference.map_or(0, |d| d.count as u64));
-                    if let Some(difference) = difference.filter(|_| is_exact) {
-                        return Err(CompareError::Wrong(Box::new(WrongCut {
-                            scene,
-                            path,
-                            frame: row.frame,
-                            strategy: self.settings.strategy,
-                            difference,
-                            views: engine.views().to_vec(),
-                            criterion: self.settings.criterion,
-                        })));
-                    }
-                }
-                Check::Nodes(brute_force) => {
-                    let wrong = brute_force.wrong(&engine);
-                    row.wrong = Some(wrong);
-                    if wrong > 0 && is_exact {
-                        let (frame, strategy) = (row.frame, self.settings.strategy.name());
-                        let backend = self.subject.backend().name();
-                        return Err(CompareError::Differs { scene, path, frame, strategy, backend, wrong });
-                    }
-                }
-            }
-            count();
-        }
-        Ok(())
     }
 }
 

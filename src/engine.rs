@@ -233,6 +233,11 @@ impl<T: VertexTree, M: MeshSink> Engine<T, M> {
         &self.views
     }
 
+    /// The nodes whose change the backend refused in the last frame for want of a page, in ascending order.
+    pub fn missing(&self) -> &[NodeId] {
+        &self.missing
+    }
+
     /// How the engine refines.
     pub fn settings(&self) -> &Settings {
         &self.settings

@@ -113,10 +113,8 @@ impl Foresight {
         let count = instants.len();
         let criterion = frame.criterion;
         let views_at = |at: usize| &views[at * frame.views.len()..][..frame.views.len()];
-        // The first instant from one on at which a node is wanted, or is not.
-        let first = |from, bounds: &Bounds, wanted| {
-            (from..count).find(|&at| criterion.unfold(views_at(at), bounds) == wanted)
-        };
+        // The first instant from one on at which a node that is not in play is wanted; what its normals say is not known.
+        let first = |from, bounds: &Bounds| (from..count).find(|&at| criterion.unfold(views_at(at), bounds));
         let mut total = 0;
         for at in 0..count {
             while let Some(change) = agenda[at].pop() {
@@ -134,7 +132,7 @@ impl Foresight {
                         peeked.clear();
                         tree.peek(node, peeked);
                         for &(child, bounds) in &*peeked {
-                            if let Some(then) = first(at, &bounds, true) {
+                            if let Some(then) = first(at, &bounds) {
                                 agenda[then].push(Change::Unfold(child));
                             }
                         }
@@ -147,7 +145,9 @@ impl Foresight {
                         tree.will_need(node, instants[at]);
                         for parent in front.parents(tree, slot) {
                             // What is wanted below the parent makes the parent wanted too: if it is not, nothing is.
-                            if let Some(then) = first(at, &front.bounds(parent), false) {
+                            let bounds = front.bounds(parent);
+                            let is_wanted = |at| frame.unfold_in(views_at(at), parent, &bounds);
+                            if let Some(then) = (at..count).find(|&at| !is_wanted(at)) {
                                 agenda[then].push(Change::Fold(parent));
                             }
                         }
@@ -174,8 +174,8 @@ impl Ahead<'_> {
     }
 
     /// Whether a node will have to change at an instant if nothing happens before.
-    fn is_wrong(&self, instant: usize, kind: Kind, bounds: &Bounds) -> bool {
-        self.frame.criterion.unfold(self.at(instant), bounds) == (kind == Kind::Unfold)
+    fn is_wrong(&self, instant: usize, kind: Kind, slot: Slot, bounds: &Bounds) -> bool {
+        self.frame.unfold_in(self.at(instant), slot, bounds) == (kind == Kind::Unfold)
     }
 
     fn lenses(&self, instant: usize) -> Option<Lenses> {

@@ -7,13 +7,14 @@
 #![allow(clippy::disallowed_methods, reason = "off the selection path")]
 
 mod axis;
+mod frame;
+mod lines;
 
-use plotters::coord::Shift;
-use plotters::coord::types::RangedCoordf64;
 use plotters::prelude::*;
-use plotters::style::text_anchor::{HPos, Pos, VPos};
 
 use axis::{Axis, moving_median, outline};
+use frame::{Canvas, Drawn, border, frame, palette, picture, pixel};
+pub use lines::{Line, lines};
 
 /// Size of the picture in CSS pixels, without the rows of the legend beyond the first.
 const SIZE: (i32, i32) = (960, 440);
@@ -22,29 +23,11 @@ const LEFT: i32 = 76;
 const RIGHT: i32 = 24;
 const BOTTOM: i32 = 58;
 const TOP: i32 = 40;
-/// Height of a row of the legend.
-const LEGEND_ROW: i32 = 22;
-/// Length of the line that stands for a curve in the legend, and the room around it.
-const SWATCH: i32 = 26;
-const GAP: i32 = 8;
 /// The backend's coordinates are integers; it draws on a canvas that is larger by this factor, for the picture to be
 /// scaled down again by whoever shows it.
 const FINE: i32 = 5;
 /// Points of a curve for each pixel of the plot's width, at most: the highest and the lowest of the frames there.
 const POINTS: usize = 2;
-
-const TEXT: RGBColor = RGBColor(0x33, 0x3b, 0x47);
-const FRAME: RGBColor = RGBColor(0x8b, 0x93, 0x9f);
-const GRID: RGBColor = RGBColor(0xe4, 0xe7, 0xec);
-const PALETTE: [RGBColor; 7] = [
-    RGBColor(0x00, 0x72, 0xb2),
-    RGBColor(0xd5, 0x5e, 0x00),
-    RGBColor(0x00, 0x9e, 0x73),
-    RGBColor(0xcc, 0x79, 0xa7),
-    RGBColor(0xe6, 0x9f, 0x00),
-    RGBColor(0x56, 0xb4, 0xe9),
-    RGBColor(0x20, 0x20, 0x20),
-];
 
 /// What a plot says about itself, and how it is drawn.
 #[derive(Clone, Copy, Debug, Default)]
@@ -82,9 +65,6 @@ pub struct PlotError {
     source: DrawingAreaErrorKind<std::io::Error>,
 }
 
-type Canvas<'a> = DrawingArea<SVGBackend<'a>, Shift>;
-type Drawn = Result<(), DrawingAreaErrorKind<std::io::Error>>;
-
 /// Draws the curves, as the text of an SVG file.
 ///
 /// The range of values is that of 99.8 % of each series, so that a single spike does not flatten everything; where
@@ -93,28 +73,14 @@ type Drawn = Result<(), DrawingAreaErrorKind<std::io::Error>>;
 /// # Errors
 /// What the drawing library says; it has no reason to fail.
 pub fn curves(plot: &Plot, series: &[Series]) -> Result<String, PlotError> {
-    let legend = Legend::new(series);
-    let (width, height) = (SIZE.0, SIZE.1 + legend.rows * LEGEND_ROW);
-    let mut svg = String::new();
-    let draw = |svg: &mut String| {
-        let size = ((width * FINE) as u32, (height * FINE) as u32);
-        let canvas = SVGBackend::with_string(svg, size).into_drawing_area();
-        canvas.fill(&WHITE)?;
-        canvas.draw(&text(plot.title, (LEFT, 24), 16.0, (HPos::Left, VPos::Center), FontTransform::None))?;
-        legend.draw(&canvas, series)?;
-        draw_curves(&canvas, plot, series, TOP + legend.rows * LEGEND_ROW, height - BOTTOM)?;
-        canvas.present()
-    };
-    draw(&mut svg).map_err(|source| PlotError { title: plot.title.to_owned(), source })?;
-    // The canvas stays as fine as it was drawn, the picture gets its size.
-    let fine = format!("width=\"{}\" height=\"{}\"", width * FINE, height * FINE);
-    Ok(svg.replacen(&fine, &format!("width=\"{width}\" height=\"{height}\""), 1))
+    let names: Vec<(&str, usize)> = series.iter().map(|s| (s.name, s.colour)).collect();
+    picture(plot, &names, |canvas, top, bottom| draw_curves(canvas, plot, series, top, bottom))
 }
 
-/// Puts pictures that [`curves`] drew below each other, as one.
+/// Puts pictures below each other, as one.
 #[must_use]
 pub fn stack(pictures: &[String]) -> String {
-    // Each starts with the size that `curves` gave it.
+    // Each starts with the size that it was given.
     let height = |svg: &String| -> i32 {
         svg.split_once("height=\"")
             .and_then(|(_, rest)| rest.split('"').next()?.parse().ok())
@@ -134,41 +100,36 @@ pub fn stack(pictures: &[String]) -> String {
     stacked
 }
 
+/// A picture of small print, to be put below others: the command that made them.
+#[must_use]
+pub fn small_print(text: &str) -> String {
+    let escaped = |line: String| line.replace('&', "&amp;").replace('<', "&lt;").replace('>', "&gt;");
+    // A line takes so many characters at most.
+    let characters: Vec<char> = text.chars().collect();
+    let lines: Vec<String> = characters.chunks(140).map(|line| escaped(line.iter().collect())).collect();
+    let height = 12 + 14 * lines.len();
+    let mut svg = format!(
+        "<svg width=\"{0}\" height=\"{height}\" viewBox=\"0 0 {0} {height}\" xmlns=\"http://www.w3.org/2000/svg\">\n\
+         <rect width=\"100%\" height=\"100%\" fill=\"#FFFFFF\"/>\n",
+        SIZE.0
+    );
+    for (line, y) in lines.iter().zip((12..).step_by(14)) {
+        svg += &format!(
+            "<text x=\"{LEFT}\" y=\"{y}\" font-family=\"monospace\" font-size=\"10\" fill=\"#6B7280\">{line}</text>\n"
+        );
+    }
+    svg + "</svg>\n"
+}
+
 /// Draws axes, grid and curves between the lines `top` and `bottom` of the picture.
 fn draw_curves(canvas: &Canvas, plot: &Plot, series: &[Series], top: i32, bottom: i32) -> Drawn {
-    let (left, right) = (LEFT, SIZE.0 - RIGHT);
     let frames = series.iter().map(|s| s.values.len()).max().unwrap_or(0);
     let x = Axis::frames(plot.first_frame, frames);
     let values: Vec<&[f64]> = series.iter().map(|s| s.values).collect();
     let y = Axis::values(&values, plot.logarithmic);
-    let area = canvas.clone().apply_coord_spec(Cartesian2d::<RangedCoordf64, RangedCoordf64>::new(
-        x.ends[0]..x.ends[1],
-        y.ends[0]..y.ends[1],
-        (left * FINE..right * FINE, bottom * FINE..top * FINE),
-    ));
+    let area = frame(canvas, plot, &x, &y, top, bottom)?;
 
-    let grid = GRID.stroke_width(FINE as u32);
-    let pixel = |at: (f64, f64)| {
-        let (x, y) = area.map_coordinate(&at);
-        (x / FINE, y / FINE)
-    };
-    for (at, label) in &x.ticks {
-        area.draw(&PathElement::new([(*at, y.ends[0]), (*at, y.ends[1])], grid))?;
-        let below = (pixel((*at, y.ends[0])).0, bottom + 8);
-        canvas.draw(&text(label, below, 12.0, (HPos::Center, VPos::Top), FontTransform::None))?;
-    }
-    for (at, label) in &y.ticks {
-        area.draw(&PathElement::new([(x.ends[0], *at), (x.ends[1], *at)], grid))?;
-        let beside = (left - 8, pixel((x.ends[0], *at)).1);
-        canvas.draw(&text(label, beside, 12.0, (HPos::Right, VPos::Center), FontTransform::None))?;
-    }
-    let middle = (left + right) / 2;
-    let center = (HPos::Center, VPos::Center);
-    canvas.draw(&text(plot.x_label, (middle, bottom + 40), 13.0, center, FontTransform::None))?;
-    let middle = (top + bottom) / 2;
-    canvas.draw(&text(plot.y_label, (20, middle), 13.0, center, FontTransform::Rotate270))?;
-
-    let columns = (right - left) as usize;
+    let columns = (SIZE.0 - RIGHT - LEFT) as usize;
     let curve = |values: &[f64], style: ShapeStyle| -> Drawn {
         for points in outline(values, columns, POINTS) {
             let at = |&(frame, value): &(usize, f64)| {
@@ -190,7 +151,7 @@ fn draw_curves(canvas: &Canvas, plot: &Plot, series: &[Series], top: i32, bottom
     for s in series {
         let mut free_from = i32::MIN;
         for (frame, &value) in s.values.iter().enumerate() {
-            let (x, _) = pixel(((plot.first_frame + frame) as f64, y.ends[1]));
+            let (x, _) = pixel(&area, ((plot.first_frame + frame) as f64, y.ends[1]));
             if value.is_finite() && y.place(value) > y.ends[1] && x >= free_from {
                 let triangle =
                     [(x - 4, top + 7), (x + 4, top + 7), (x, top)].map(|(x, y)| (x * FINE, y * FINE));
@@ -199,9 +160,7 @@ fn draw_curves(canvas: &Canvas, plot: &Plot, series: &[Series], top: i32, bottom
             }
         }
     }
-
-    let corners = [(left, top), (left, bottom), (right, bottom)].map(|(x, y)| (x * FINE, y * FINE));
-    canvas.draw(&PathElement::new(corners, FRAME.stroke_width(FINE as u32)))
+    border(canvas, top, bottom)
 }
 
 /// The values with gaps, as NaN, where there is no place on the axis.
@@ -210,56 +169,7 @@ fn finite_places(values: &[f64], y: &Axis) -> Vec<f64> {
 }
 
 fn colour(series: &Series) -> RGBColor {
-    PALETTE[series.colour % PALETTE.len()]
-}
-
-/// Text of `size` CSS pixels, anchored at a place in the picture.
-fn text<'a>(
-    content: &'a str,
-    (x, y): (i32, i32),
-    size: f64,
-    (h, v): (HPos, VPos),
-    turned: FontTransform,
-) -> Text<'a, (i32, i32), &'a str> {
-    // The backend writes font sizes divided by this.
-    const BACKEND_SCALE: f64 = 1.24;
-    let font = ("sans-serif", size * BACKEND_SCALE * f64::from(FINE)).into_font().transform(turned);
-    Text::new(content, (x * FINE, y * FINE), font.color(&TEXT).pos(Pos::new(h, v)))
-}
-
-/// Where the names of the curves stand: in rows below the title.
-struct Legend {
-    /// Left end and row of each series' entry.
-    places: Vec<(i32, i32)>,
-    rows: i32,
-}
-
-impl Legend {
-    fn new(series: &[Series]) -> Self {
-        let (mut x, mut row) = (LEFT, 0);
-        let mut places = Vec::new();
-        for s in series {
-            // There are no font metrics; this is a wide estimate for a size of 13.
-            let width = SWATCH + 3 * GAP + (7.6 * s.name.chars().count().min(1000) as f64) as i32;
-            if x + width > SIZE.0 - RIGHT && x > LEFT {
-                (x, row) = (LEFT, row + 1);
-            }
-            places.push((x, row));
-            x += width;
-        }
-        Self { places, rows: row + 1 }
-    }
-
-    fn draw(&self, canvas: &Canvas, series: &[Series]) -> Drawn {
-        for (s, &(x, row)) in series.iter().zip(&self.places) {
-            let y = TOP + row * LEGEND_ROW + LEGEND_ROW / 2 - 2;
-            let line = [(x * FINE, y * FINE), ((x + SWATCH) * FINE, y * FINE)];
-            canvas.draw(&PathElement::new(line, colour(s).stroke_width(3 * FINE as u32)))?;
-            let beside = (x + SWATCH + GAP, y);
-            canvas.draw(&text(s.name, beside, 13.0, (HPos::Left, VPos::Center), FontTransform::None))?;
-        }
-        Ok(())
-    }
+    palette(series.colour)
 }
 
 #[cfg(test)]

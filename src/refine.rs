@@ -68,7 +68,15 @@ impl Frame<'_> {
         self.criterion.unfold(self.views, bounds) && self.is_seen(slot, bounds)
     }
 
-    /// The same of two nodes.
+    /// Whether it would be in other views.
+    pub fn unfold_in(&self, views: &[View], slot: Slot, bounds: &Bounds) -> bool {
+        match self.cones {
+            None => self.criterion.unfold(views, bounds),
+            Some(cones) => normal_cone::unfold(self.criterion, views, bounds, &cones.of(slot)),
+        }
+    }
+
+    /// [`unfold`](Self::unfold) of two nodes.
     #[inline(always)]
     pub fn unfold_both(&self, slots: [Slot; 2], bounds: [&Bounds; 2]) -> [bool; 2] {
         let wanted = self.criterion.unfold_both(self.views, bounds);

@@ -1,15 +1,20 @@
 //! The comparison as one self-contained HTML page: tables, curves and pictures.
 
+mod figures;
+mod tables;
+
 use std::fmt::Write;
 use std::time::Duration;
 
 use base64::Engine as _;
 use base64::engine::general_purpose::STANDARD;
 
-use crate::compare::Run;
+use self::tables::microseconds;
 use crate::compare::csv::Summary;
-use crate::plot::{self, Plot, PlotError, Series};
+use crate::compare::{Pace, Run};
+use crate::plot::{self, PlotError};
 use crate::refine::Strategy;
+use crate::store::Backend;
 
 /// A picture with what it shows.
 #[derive(Clone, Debug)]
@@ -20,107 +25,85 @@ pub struct Picture {
     pub png: Vec<u8>,
 }
 
-/// All about one scene.
+/// All about one scene in one backend.
 #[derive(Clone, Debug)]
 pub struct Section {
-    /// What was looked at.
+    /// A name that no other section has.
     pub name: String,
+    /// What was looked at.
+    pub scene: String,
+    /// Where the hierarchy was kept.
+    pub backend: Backend,
+    /// Triangles of the input; 0 where they were not counted.
+    pub triangles: u64,
+    /// Size of the hierarchy's file.
+    pub file_bytes: Option<u64>,
+    /// What making the collapse log took, and what writing it for the backend did.
+    pub simplification: Option<Duration>,
+    /// See [`Self::simplification`].
+    pub writing: Option<Duration>,
     /// Figures of the hierarchy, as name and value.
     pub facts: Vec<(&'static str, String)>,
-    /// Every strategy along every path, those of one path together.
+    /// Every strategy and every way to prefetch along every path, the strategies of one path and way together.
     pub runs: Vec<Run>,
     /// What it looks like.
     pub pictures: Vec<Picture>,
 }
 
 impl Section {
-    fn paths(&self) -> impl Iterator<Item = &[Run]> {
-        self.runs.chunk_by(|a, b| a.path == b.path)
+    /// With nothing but its runs.
+    #[must_use]
+    pub fn new(scene: &str, backend: Backend, runs: Vec<Run>) -> Self {
+        Self {
+            name: scene.to_owned(),
+            scene: scene.to_owned(),
+            backend,
+            triangles: 0,
+            file_bytes: None,
+            simplification: None,
+            writing: None,
+            facts: Vec::new(),
+            runs,
+            pictures: Vec::new(),
+        }
     }
 
-    /// Selection time along every path, one curve a strategy, a panel a path.
+    /// The strategies of each path and way to prefetch.
+    fn replays(&self) -> impl Iterator<Item = &[Run]> {
+        self.runs.chunk_by(|a, b| a.path == b.path && a.prefetch == b.prefetch)
+    }
+
+    fn title(&self, runs: &[Run]) -> String {
+        let prefetch = match self.backend {
+            Backend::InMemory => String::new(),
+            _ => format!(", prefetch {}", runs[0].prefetch.name()),
+        };
+        format!("{}, {}, path {}{prefetch}", self.scene, self.backend.name(), runs[0].path)
+    }
+
+    /// A quantity along every path, one curve a strategy, a panel a path.
+    fn panels(&self, quantity: &figures::Quantity) -> Result<Vec<String>, PlotError> {
+        let panel = |runs: &[Run]| {
+            let all: Vec<&Run> = runs.iter().collect();
+            figures::panel(
+                &format!("{}: {}", self.title(runs), quantity.name),
+                quantity,
+                &all,
+                figures::by_strategy,
+            )
+        };
+        self.replays().map(panel).collect()
+    }
+
+    /// Selection time along every path, one curve a strategy, a panel a path; below them the command that made them.
     ///
     /// # Errors
     /// What [`plot::curves`] says.
-    pub fn curves(&self) -> Result<String, PlotError> {
-        let panels: Vec<String> =
-            self.paths().map(|runs| panel(&self.name, runs)).collect::<Result<_, _>>()?;
+    pub fn curves(&self, command: &str) -> Result<String, PlotError> {
+        let mut panels = self.panels(&figures::SELECTION)?;
+        panels.push(plot::small_print(command));
         Ok(plot::stack(&panels))
     }
-}
-
-fn panel(scene: &str, runs: &[Run]) -> Result<String, PlotError> {
-    let values: Vec<Vec<f64>> =
-        runs.iter().map(|run| run.rows.iter().map(|row| milliseconds(row.report.select)).collect()).collect();
-    let series: Vec<Series> = runs
-        .iter()
-        .zip(&values)
-        .map(|(run, values)| Series {
-            name: run.strategy.name(),
-            values,
-            colour: Strategy::ALL.iter().position(|&s| s == run.strategy).unwrap_or(0),
-        })
-        .collect();
-    let plot = Plot {
-        title: &format!("{scene}, path {}", runs[0].path),
-        x_label: "frame",
-        y_label: "selection time, ms",
-        first_frame: runs[0].rows.first().map_or(0, |row| row.frame),
-        logarithmic: true,
-        median_window: 15,
-    };
-    plot::curves(&plot, &series)
-}
-
-fn milliseconds(time: Duration) -> f64 {
-    time.as_secs_f64() * 1e3
-}
-
-fn microseconds(time: Duration) -> String {
-    let value = time.as_secs_f64() * 1e6;
-    if value < 100.0 { format!("{value:.1}") } else { format!("{value:.0}") }
-}
-
-/// Columns of the table of a path. The report explains each below its first table.
-const COLUMNS: [(&str, &str); 12] = [
-    ("strategy", "how the nodes that must change are found"),
-    ("median µs", "the whole refinement step, median over the frames"),
-    ("99 % µs", "the same, 99th percentile"),
-    ("find µs", "the part that finds what must change, median"),
-    ("apply µs", "the part that folds, unfolds and patches the mesh, median"),
-    ("tests", "tests of the criterion a frame"),
-    ("changes", "folds and unfolds a frame"),
-    ("tests / change", "the ideal is 1"),
-    ("active nodes", "mean over the frames"),
-    ("triangles", "displayed, mean over the frames"),
-    (
-        "wrong nodes",
-        "nodes whose status is not the oracle's, mean and most in a frame, where that was checked",
-    ),
-    ("vs top-down", "median of top-down over this median"),
-];
-
-fn table_rows(runs: &[Run]) -> Vec<[String; COLUMNS.len()]> {
-    let summaries: Vec<Summary> = runs.iter().map(Summary::new).collect();
-    let top_down = runs.iter().position(|run| run.strategy == Strategy::TopDown).map(|at| summaries[at]);
-    let row = |(run, s): (&Run, &Summary)| {
-        let ratio = top_down.map(|t| t.select_median.as_secs_f64() / s.select_median.as_secs_f64().max(1e-9));
-        [
-            run.strategy.name().to_owned(),
-            microseconds(s.select_median),
-            microseconds(s.select_p99),
-            microseconds(s.find_median),
-            microseconds(s.apply_median),
-            format!("{:.0}", s.tests_mean),
-            format!("{:.1}", s.changes_mean),
-            format!("{:.1}", s.tests_mean / s.changes_mean.max(1e-9)),
-            format!("{:.0}", s.active_nodes_mean),
-            format!("{:.0}", s.triangles_mean),
-            s.wrong.map_or_else(String::new, |w| format!("{:.1}, {}", w.mean, w.largest)),
-            ratio.map_or_else(String::new, |r| format!("{r:.1} ×")),
-        ]
-    };
-    runs.iter().zip(&summaries).map(row).collect()
 }
 
 /// Everything that was compared.
@@ -128,32 +111,45 @@ fn table_rows(runs: &[Run]) -> Vec<[String; COLUMNS.len()]> {
 pub struct Report {
     /// The command that made it.
     pub command: String,
-    /// The scenes.
+    /// How time passed.
+    pub pace: Pace,
+    /// The scenes, all backends of one together.
     pub sections: Vec<Section>,
 }
 
 impl Report {
+    /// All backends of each scene.
+    fn scenes(&self) -> impl Iterator<Item = &[Section]> {
+        self.sections.chunk_by(|a, b| a.scene == b.scene)
+    }
+
     /// The tables, in plain text.
     #[must_use]
     pub fn to_text(&self) -> String {
         let mut text = String::new();
-        for runs in self.sections.iter().flat_map(Section::paths) {
-            let header = COLUMNS.map(|(name, _)| name.to_owned());
-            let rows: Vec<_> = std::iter::once(header).chain(table_rows(runs)).collect();
-            let width = |column: usize| rows.iter().map(|r| r[column].chars().count()).max().unwrap_or(0);
-            let widths: [usize; COLUMNS.len()] = std::array::from_fn(width);
-            let _ = writeln!(text, "\n{}, {}, path {}", runs[0].scene, runs[0].backend, runs[0].path);
-            for row in &rows {
-                for (at, (cell, width)) in row.iter().zip(widths).enumerate() {
-                    let _ = if at == 0 {
-                        write!(text, "{cell:width$}")
-                    } else {
-                        write!(text, "  {cell:>width$}")
-                    };
-                }
-                text.truncate(text.trim_end().len());
-                text.push('\n');
+        for section in &self.sections {
+            for runs in section.replays() {
+                let _ = writeln!(text, "\n{}", section.title(runs));
+                tables::strategies(runs).to_text(&mut text);
             }
+        }
+        for scene in self.scenes() {
+            for (path, runs) in paths(scene) {
+                let paged = tables::paged(&runs);
+                if let Some(first) = paged.first() {
+                    let _ = writeln!(
+                        text,
+                        "\n{}, path {path}: paging with {}",
+                        scene[0].scene,
+                        first.strategy.name()
+                    );
+                    tables::paging(&paged).to_text(&mut text);
+                }
+            }
+        }
+        if self.sections.iter().any(|section| section.file_bytes.is_some()) {
+            text.push_str("\nfiles and construction\n");
+            tables::storage(&self.sections).to_text(&mut text);
         }
         text
     }
@@ -168,39 +164,60 @@ impl Report {
             html,
             "<!doctype html>\n<html lang=\"en\">\n<meta charset=\"utf-8\">\n\
              <meta name=\"viewport\" content=\"width=device-width\">\n<title>foldfront: comparison</title>\n\
-             <style>{STYLE}</style>\n<h1>foldfront: comparison of refinement strategies</h1>\n\
+             <style>{STYLE}</style>\n<h1>foldfront: comparison of refinement strategies and backends</h1>\n\
              <p>Made by <code>{}</code>. Every strategy replays the same path from the base mesh on, in one process, \
-             one after the other, with the displayed mesh kept. Times are of the refinement step on one core.</p>\n",
+             one after the other, with the displayed mesh kept. Times are of the refinement step on one core. {}</p>\n",
             escape(&self.command),
+            escape(&describe(self.pace)),
         );
         self.overview(&mut html);
-        for section in &self.sections {
-            section_html(&mut html, section)?;
+        if self.sections.iter().any(|section| section.file_bytes.is_some()) {
+            html.push_str("<h2>Files and construction</h2>\n");
+            tables::storage(&self.sections).to_html(&mut html);
+        }
+        let scaling = figures::scaling(&self.sections)?;
+        if !scaling.is_empty() {
+            html.push_str("<h2>Scaling</h2>\n<p>Mean over the paths of each scene.</p>\n");
+            self.figure(&mut html, &scaling);
+        }
+        for scene in self.scenes() {
+            self.scene(&mut html, scene)?;
         }
         html.push_str("<h2>Columns</h2>\n<dl>\n");
-        for (name, meaning) in COLUMNS {
+        for (name, meaning) in
+            tables::STRATEGIES.iter().chain(&tables::PAGING[1..]).chain(&tables::STORAGE[2..])
+        {
             let _ = writeln!(html, "<dt>{}<dd>{}", escape(name), escape(meaning));
         }
         html.push_str("</dl>\n</html>\n");
         Ok(html)
     }
 
-    /// One line a path: who is fastest, and by how much.
+    fn figure(&self, html: &mut String, panels: &[String]) {
+        let _ = writeln!(
+            html,
+            "<figure>{}<figcaption>Made by <code>{}</code></figcaption></figure>",
+            plot::stack(panels),
+            escape(&self.command)
+        );
+    }
+
+    /// One line a replay: who is fastest, and by how much.
     fn overview(&self, html: &mut String) {
-        html.push_str("<table>\n<tr><th>scene<th>path<th>frames");
+        html.push_str("<table>\n<tr><th>scene<th>backend<th>prefetch<th>path<th>frames");
         for strategy in Strategy::ALL {
             let _ = write!(html, "<th>{}, median µs", strategy.name());
         }
-        html.push_str("<th>event vs top-down\n");
-        for runs in self.sections.iter().flat_map(Section::paths) {
-            let median = |strategy| {
-                let run = runs.iter().find(|run| run.strategy == strategy)?;
-                Some(Summary::new(run).select_median)
-            };
+        html.push_str("<th>event vs top-down<th>misses, % of flips\n");
+        for runs in self.sections.iter().flat_map(Section::replays) {
+            let summary = |strategy| Some(Summary::new(runs.iter().find(|run| run.strategy == strategy)?));
+            let median = |strategy| summary(strategy).map(|s| s.select_median);
             let _ = write!(
                 html,
-                "<tr><td>{}<td>{}<td>{}",
+                "<tr><td>{}<td>{}<td>{}<td>{}<td>{}",
                 escape(&runs[0].scene),
+                runs[0].backend,
+                runs[0].prefetch.name(),
                 escape(&runs[0].path),
                 runs[0].rows.len()
             );
@@ -211,65 +228,127 @@ impl Report {
                 median(Strategy::TopDown).zip(median(Strategy::Event)).map_or_else(String::new, |(t, e)| {
                     format!("{:.1} ×", t.as_secs_f64() / e.as_secs_f64().max(1e-9))
                 });
-            let _ = writeln!(html, "<td>{ratio}");
+            let misses =
+                runs.iter().find(|run| run.strategy.is_exact()).map(|run| Summary::new(run).miss_percent);
+            let _ =
+                writeln!(html, "<td>{ratio}<td>{}", misses.map_or_else(String::new, |m| format!("{m:.3}")));
         }
         html.push_str("</table>\n");
+    }
+
+    /// All backends of one scene.
+    fn scene(&self, html: &mut String, sections: &[Section]) -> Result<(), PlotError> {
+        let _ = writeln!(html, "<h2>{}</h2>", escape(&sections[0].scene));
+        for section in sections {
+            let _ = writeln!(html, "<h3>{}</h3>\n<table class=\"facts\">", section.backend.name());
+            for (name, value) in &section.facts {
+                let _ = writeln!(html, "<tr><th>{}<td>{}", escape(name), escape(value));
+            }
+            html.push_str("</table>\n");
+            self.figure(html, &section.panels(&figures::SELECTION)?);
+            for runs in section.replays() {
+                let speed = runs[0].speed;
+                let _ = writeln!(
+                    html,
+                    "<h4>{}</h4>\n<p>Declared full speed: rho = {:.4} object units, omega = {:.5} rad a frame.</p>",
+                    escape(&section.title(runs)),
+                    speed.rho,
+                    speed.omega,
+                );
+                tables::strategies(runs).to_html(html);
+                inexact(html, runs);
+            }
+            html.push_str("<details><summary>Tests and changes in every frame</summary>\n");
+            self.figure(html, &section.panels(&figures::TESTS)?);
+            self.figure(html, &section.panels(&figures::CHANGES)?);
+            html.push_str("</details>\n<div class=\"pictures\">\n");
+            for picture in &section.pictures {
+                let _ = writeln!(
+                    html,
+                    "<figure><img alt=\"\" src=\"data:image/png;base64,{}\"><figcaption>{}</figcaption></figure>",
+                    STANDARD.encode(&picture.png),
+                    escape(&picture.caption),
+                );
+            }
+            html.push_str("</div>\n");
+        }
+        for (path, runs) in paths(sections) {
+            let paged = tables::paged(&runs);
+            if paged.is_empty() {
+                continue;
+            }
+            let _ =
+                writeln!(html, "<h3>Paging along {}, with {}</h3>", escape(path), paged[0].strategy.name());
+            tables::paging(&paged).to_html(html);
+            for quantity in &figures::PAGING {
+                let panel = |runs: &[&Run]| {
+                    let title =
+                        format!("{}, {}, path {path}: {}", runs[0].scene, runs[0].backend, quantity.name);
+                    figures::panel(&title, quantity, runs, figures::by_prefetch)
+                };
+                let panels: Vec<String> =
+                    paged.chunk_by(|a, b| a.backend == b.backend).map(panel).collect::<Result<_, _>>()?;
+                let _ = writeln!(html, "<details><summary>{} in every frame</summary>", quantity.name);
+                self.figure(html, &panels);
+                html.push_str("</details>\n");
+            }
+        }
+        Ok(())
     }
 }
 
-fn section_html(html: &mut String, section: &Section) -> Result<(), PlotError> {
-    let _ = writeln!(html, "<h2>{}</h2>\n<table class=\"facts\">", escape(&section.name));
-    for (name, value) in &section.facts {
-        let _ = writeln!(html, "<tr><th>{}<td>{}", escape(name), escape(value));
-    }
-    let _ = writeln!(html, "</table>\n<figure>{}</figure>", section.curves()?);
-    for runs in section.paths() {
-        let speed = runs[0].speed;
-        let _ = writeln!(
-            html,
-            "<h3>Path {}</h3>\n<p>Declared full speed: rho = {:.4} object units, omega = {:.5} rad a frame.</p>",
-            escape(&runs[0].path),
-            speed.rho,
-            speed.omega,
-        );
-        html.push_str("<table>\n<tr>");
-        for (name, _) in COLUMNS {
-            let _ = write!(html, "<th>{}", escape(name));
-        }
-        html.push('\n');
-        for row in table_rows(runs) {
-            html.push_str("<tr>");
-            for cell in row {
-                let _ = write!(html, "<td>{}", escape(&cell));
-            }
-            html.push('\n');
-        }
-        html.push_str("</table>\n");
-        for run in runs.iter().filter(|run| !run.strategy.is_exact()) {
-            if let Some(wrong) = Summary::new(run).wrong {
-                let _ = writeln!(
-                    html,
-                    "<p>{} is not exact: it has wrong nodes in {:.1} % of the frames, {:.1} on average and up to {} \
-                     in a frame.</p>",
-                    run.strategy.name(),
-                    wrong.frames_percent,
-                    wrong.mean,
-                    wrong.largest,
-                );
-            }
+/// The runs of a scene by path, those of all backends together.
+fn paths(sections: &[Section]) -> Vec<(&str, Vec<&Run>)> {
+    let mut paths: Vec<(&str, Vec<&Run>)> = Vec::new();
+    for run in sections.iter().flat_map(|section| &section.runs) {
+        match paths.iter_mut().find(|(path, _)| *path == run.path) {
+            Some((_, runs)) => runs.push(run),
+            None => paths.push((&run.path, vec![run])),
         }
     }
-    html.push_str("<div class=\"pictures\">\n");
-    for picture in &section.pictures {
-        let _ = writeln!(
-            html,
-            "<figure><img alt=\"\" src=\"data:image/png;base64,{}\"><figcaption>{}</figcaption></figure>",
-            STANDARD.encode(&picture.png),
-            escape(&picture.caption),
-        );
+    paths
+}
+
+/// How a strategy that is not exact did.
+fn inexact(html: &mut String, runs: &[Run]) {
+    for run in runs.iter().filter(|run| !run.strategy.is_exact()) {
+        if let Some(wrong) = Summary::new(run).wrong {
+            let _ = writeln!(
+                html,
+                "<p>{} is not exact: it has wrong nodes in {:.1} % of the frames, {:.1} on average and up to {} \
+                 in a frame.</p>",
+                run.strategy.name(),
+                wrong.frames_percent,
+                wrong.mean,
+                wrong.largest,
+            );
+        }
     }
-    html.push_str("</div>\n");
-    Ok(())
+}
+
+fn describe(pace: Pace) -> String {
+    let rate = |frame: Duration| 1.0 / frame.as_secs_f64();
+    match pace {
+        Pace::Settled => "Each frame waits for its pages, so that cuts can be compared.".to_owned(),
+        Pace::Simulated(frame, store) => {
+            let bandwidth = store.bandwidth.map_or_else(
+                || "no limit on bandwidth".to_owned(),
+                |bandwidth| format!("{:.1} MiB a second", bandwidth as f64 / f64::from(1 << 20)),
+            );
+            format!(
+                "Real time of {:.0} frames a second, on virtual time: a simulated store with a latency of {:?}, {bandwidth} \
+                 and {} reads under way at most. The first frame waits for its pages.",
+                rate(frame),
+                store.latency,
+                store.depth
+            )
+        }
+        Pace::WallClock(frame) => format!(
+            "Real time of {:.0} frames a second by the wall clock, from files as they are. The first frame waits for its \
+             pages.",
+            rate(frame)
+        ),
+    }
 }
 
 fn escape(text: &str) -> String {
@@ -289,5 +368,6 @@ figure { margin: 1rem 0; }
 figure svg, figure img { max-width: 100%; height: auto; }
 figcaption { color: #555; font-size: 14px; }
 .pictures { display: grid; grid-template-columns: repeat(auto-fit, minmax(30rem, 1fr)); gap: 1rem; }
+summary { cursor: pointer; color: #0072b2; }
 dt { font-weight: 600; }
 ";

@@ -257,6 +257,22 @@ impl Store {
         }
     }
 
+    /// Opens what a paging backend wrote, wherever it is kept. Collapse logs are read from files alone.
+    ///
+    /// # Errors
+    /// [`StoreError::Foreign`], and what is wrong with it.
+    pub fn from_source(source: Arc<dyn PageSource>) -> Result<Self, StoreError> {
+        let file = PathBuf::from(source.name());
+        let mut magic = [0; 8];
+        source.read_at(0, &mut magic).map_err(|source| StoreError::Io { file: file.clone(), source })?;
+        match Backend::of_magic(magic) {
+            None | Some(Backend::InMemory) => Err(StoreError::Foreign { file }),
+            Some(Backend::MetaNode) => Ok(Self::MetaNode(Arc::new(MetaNodeFile::open(source)?))),
+            Some(Backend::DetailBlock) => Ok(Self::DetailBlock(Arc::new(XfmFile::open(source)?))),
+            Some(Backend::MtPartition) => Ok(Self::MtPartition(Arc::new(MtFile::open(source)?))),
+        }
+    }
+
     /// The backend that it is for.
     #[must_use]
     pub fn backend(&self) -> Backend {
@@ -277,6 +293,21 @@ impl Store {
             Self::DetailBlock(file) => file.facts(),
             Self::MtPartition(file) => file.facts(),
         }
+    }
+
+    /// Triangles of the input.
+    #[must_use]
+    pub fn triangles(&self) -> u64 {
+        if let Self::InMemory(_, log) = self {
+            return log.mesh.triangles.len() as u64;
+        }
+        // Each of the files says so among its facts.
+        let facts = self.facts();
+        facts
+            .iter()
+            .find(|(name, _)| *name == "triangles")
+            .and_then(|(_, value)| value.parse().ok())
+            .unwrap_or(0)
     }
 
     /// Reads and checks every page.

@@ -7,8 +7,11 @@ use std::time::Duration;
 use clap::{Args, Parser, Subcommand, ValueEnum};
 use meta_node::Dependencies;
 use mt_partition::CacheMode;
+use vertex_tree::Prefetch;
+use vertex_tree::simulated::Simulated;
 
 use crate::budget::WorkCap;
+use crate::compare::Pace;
 use crate::criterion::Criterion;
 use crate::path::import;
 use crate::refine::Strategy;
@@ -31,7 +34,7 @@ pub(super) enum Command {
     /// Check a hierarchy file wholly.
     Verify(Verify),
     /// Replay walkthroughs with every refinement strategy and write tables, curves and a report.
-    Compare(Compare),
+    Compare(Box<Compare>),
     /// Make, import and describe walkthrough paths.
     Path(PathCommand),
     /// Write the refined mesh of one frame.
@@ -181,6 +184,23 @@ pub(super) struct Compare {
     /// What meta-nodes make of neighbours that are too coarse or too fine for a change.
     #[arg(long, value_enum, default_value = "off")]
     pub dependencies: DependencyRule,
+    /// paper, schedule, none: what fetches pages before they are needed. Each paper's own scheme, the engine's foresight,
+    /// or nothing.
+    #[arg(long, value_delimiter = ',', value_name = "LIST", default_value = "paper", value_parser = prefetch)]
+    pub prefetch: Vec<Prefetch>,
+    /// Replay in real time at N frames a second, so that pages can be late: on virtual time, with a simulated store. By
+    /// default each frame waits for its pages.
+    #[arg(long, value_name = "N", value_parser = positive)]
+    pub fps: Option<f64>,
+    /// Time from a read to its first byte [default: 5ms].
+    #[arg(long, value_name = "TIME", value_parser = duration, requires = "fps", conflicts_with = "wall_clock")]
+    pub store_latency: Option<Duration>,
+    /// Bytes a second that the simulated store carries, such as 200M; by default no limit.
+    #[arg(long, value_name = "SIZE", value_parser = size, requires = "fps", conflicts_with = "wall_clock")]
+    pub store_bandwidth: Option<u64>,
+    /// Replay by the wall clock, from the files as they are.
+    #[arg(long, requires = "fps")]
+    pub wall_clock: bool,
     #[command(flatten)]
     pub refinement: Refinement,
     /// Steer the tolerance so that no more triangles are displayed.
@@ -214,6 +234,23 @@ pub(super) enum DependencyRule {
     Block,
     /// Nothing: spheres and errors are nested over all dependencies.
     Off,
+}
+
+/// Latency of a store where none is given: that of a disk with moving heads, or of a network drive.
+const STORE_LATENCY: Duration = Duration::from_millis(5);
+
+impl Compare {
+    /// How time passes.
+    pub fn pace(&self) -> Pace {
+        let Some(fps) = self.fps else { return Pace::Settled };
+        let frame = Duration::from_secs_f64((1.0 / fps).min(1e6));
+        if self.wall_clock {
+            return Pace::WallClock(frame);
+        }
+        let latency = self.store_latency.unwrap_or(STORE_LATENCY);
+        let store = Simulated { bandwidth: self.store_bandwidth, ..Simulated::with_latency(latency) };
+        Pace::Simulated(frame, store)
+    }
 }
 
 impl From<DependencyRule> for Dependencies {
@@ -407,6 +444,11 @@ fn duration(text: &str) -> Result<Duration, String> {
 fn backend(text: &str) -> Result<Backend, String> {
     let names = || format!("one of {} is expected", Backend::ALL.map(Backend::name).join(", "));
     Backend::ALL.into_iter().find(|b| b.name() == text).ok_or_else(names)
+}
+
+fn prefetch(text: &str) -> Result<Prefetch, String> {
+    let names = || format!("one of {} is expected", Prefetch::ALL.map(Prefetch::name).join(", "));
+    Prefetch::ALL.into_iter().find(|prefetch| prefetch.name() == text).ok_or_else(names)
 }
 
 fn cache(text: &str) -> Result<CacheMode, String> {

@@ -31,20 +31,27 @@ pub(super) fn compare(command: &Compare) -> Result<()> {
     super::check_folder(&command.out)?;
 
     let arguments: Vec<String> = std::env::args().skip(1).collect();
-    let mut report = Report { command: format!("foldfront {}", arguments.join(" ")), sections: Vec::new() };
+    let made_by = format!("foldfront {}", arguments.join(" "));
+    let mut report = Report { command: made_by, pace: options.pace, sections: Vec::new() };
     for (input, name) in inputs.iter().zip(unique_names(&inputs)) {
-        for subject in input.replayable(&name, &command.backend, &BuildOptions::from(&command.storage))? {
-            let name = match (&command.backend[..], subject.subject.backend()) {
-                ([] | [_], _) => name.clone(),
-                (_, backend) => format!("{name}-{}", backend.name()),
+        let subjects = input.replayable(&name, &command.backend, &BuildOptions::from(&command.storage))?;
+        let walks = walks(input, &subjects, &paths)?;
+        let is_alone = subjects.len() == 1;
+        for subject in subjects {
+            let name = match subject.subject.backend() {
+                _ if is_alone => name.clone(),
+                backend => format!("{name}-{}", backend.name()),
             };
-            report.sections.push(section(command, input, name, subject, &paths, &options)?);
+            report.sections.push(section(command, name, subject, &walks, &options)?);
         }
     }
     let file = command.out.join("report.html");
     let mut pages = vec![(file.clone(), report.to_html()?)];
     for section in &report.sections {
-        pages.push((command.out.join(format!("selection-{}.svg", section.name)), section.curves()?));
+        pages.push((
+            command.out.join(format!("selection-{}.svg", section.name)),
+            section.curves(&report.command)?,
+        ));
     }
     // Only now, so that a failure leaves what is there as it is.
     std::fs::create_dir_all(&command.out).with_context(|| command.out.display().to_string())?;
@@ -57,24 +64,30 @@ pub(super) fn compare(command: &Compare) -> Result<()> {
     print(&format!("{}\nThe report is in {}\n", report.to_text(), file.display()))
 }
 
-/// Everything about one input.
+/// The walkthroughs to replay: those that were asked for, those that were recorded for a scene, or one around the mesh.
+fn walks(input: &Input, subjects: &[Replayable], paths: &[Path]) -> Result<Vec<Path>> {
+    Ok(match (paths, input, subjects) {
+        ([], Input::Scene(scene), _) => path::recorded(scene.kind())?.to_vec(),
+        // What is stored is unfolded wholly for this, and may not fit into memory: to be avoided with `--path`.
+        ([], _, [Replayable { log: None, subject, .. }, ..]) => vec![path::around(&subject.finest()?)],
+        ([], _, [Replayable { log: Some(log), .. }, ..]) => vec![path::around(&log.mesh)],
+        (paths, ..) => paths.to_vec(),
+    })
+}
+
+/// Everything about one input in one backend.
 fn section(
     command: &Compare,
-    input: &Input,
     name: String,
-    subject: Replayable,
-    paths: &[Path],
+    replayable: Replayable,
+    walks: &[Path],
     options: &Options,
 ) -> Result<Section> {
-    let Replayable { mut subject, built, facts: stored, mesh, folder: _folder } = subject;
-    let walks = match (paths, input) {
-        ([], Input::Scene(scene)) => path::recorded(scene.kind())?.to_vec(),
-        ([], _) => vec![path::around(&mesh)],
-        (paths, _) => paths.to_vec(),
-    };
+    let Replayable { mut subject, built, facts: stored, log, file_bytes, writing, folder: _folder } =
+        replayable;
     let mut runs = Vec::new();
     let mut pictures = Vec::new();
-    for walk in &walks {
+    for walk in walks {
         let frames = command.frames.clone().unwrap_or(0..usize::MAX);
         let frames = frames.start..frames.end.min(walk.frames.len());
         if frames.is_empty() {
@@ -82,13 +95,27 @@ fn section(
         }
         let label = format!("{name}: {}, {} frames", walk.name, frames.len());
         let replayed = stage(&label, |p| subject.replay(walk, frames, options, p))?;
-        let frame = most_complex(&replayed[0]);
-        pictures.extend(stage(&format!("{name}: pictures"), |_| draw(&subject, walk, frame, options))?);
+        // One backend shows what the others do.
+        if subject.backend() == command.backend.first().copied().unwrap_or(subject.backend()) {
+            let frame = most_complex(&replayed[0]);
+            pictures.extend(stage(&format!("{name}: pictures"), |_| draw(&subject, walk, frame, options))?);
+        }
         runs.extend(replayed);
     }
-    let mut facts = facts(&mesh, built.as_ref());
+    let mut facts = facts(log.as_ref().map(|log| &log.mesh), built.as_ref());
     facts.extend(stored);
-    Ok(Section { name, facts, runs, pictures })
+    Ok(Section {
+        name,
+        scene: subject.name().to_owned(),
+        backend: subject.backend(),
+        triangles: subject.triangles(),
+        file_bytes,
+        simplification: built.map(|b| b.preparation + b.simplification + b.conclusion),
+        writing,
+        facts,
+        runs,
+        pictures,
+    })
 }
 
 /// The frame with the most active nodes: the one that shows most.
@@ -112,12 +139,13 @@ fn draw(subject: &Subject, walk: &Path, frame: usize, options: &Options) -> Resu
     ])
 }
 
-fn facts(mesh: &Mesh, built: Option<&simplify::Report>) -> Vec<(&'static str, String)> {
-    let mut facts = vec![
-        ("triangles", mesh.triangles.len().to_string()),
-        ("vertices", mesh.positions.len().to_string()),
-        ("extent", format!("{:.4}", mesh.extent())),
-    ];
+fn facts(mesh: Option<&Mesh>, built: Option<&simplify::Report>) -> Vec<(&'static str, String)> {
+    let mut facts = Vec::new();
+    if let Some(mesh) = mesh {
+        facts.push(("triangles", mesh.triangles.len().to_string()));
+        facts.push(("vertices", mesh.positions.len().to_string()));
+        facts.push(("extent", format!("{:.4}", mesh.extent())));
+    }
     if let Some(built) = built {
         facts.push(("collapses", built.collapses.to_string()));
         let time = (built.preparation + built.simplification + built.conclusion).as_secs_f64();
@@ -174,5 +202,7 @@ fn options(command: &Compare) -> Options {
             cache: command.cache,
             dependencies: command.dependencies.into(),
         },
+        prefetch: command.prefetch.clone(),
+        pace: command.pace(),
     }
 }

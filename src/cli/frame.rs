@@ -73,12 +73,20 @@ pub(super) fn deviation(command: &Deviation) -> Result<()> {
     for &frame in &command.frames {
         check_frame(&path, frame)?;
     }
-    let Replayable { subject, mesh, .. } = subject(&command.file)?;
-    let against = match command.against.as_slice() {
-        [] => None,
-        arguments => Some(Input::one(arguments)?.mesh()?),
+    let Replayable { subject, log, .. } = subject(&command.file)?;
+    let own;
+    let original = match (command.against.as_slice(), &log) {
+        ([], Some(log)) => &log.mesh,
+        ([], None) => {
+            own = subject.finest()?;
+            &own
+        }
+        (arguments, _) => {
+            own = Input::one(arguments)?.mesh()?;
+            &own
+        }
     };
-    let reference = Reference::new(against.as_ref().unwrap_or(&mesh));
+    let reference = Reference::new(original);
     let options = options(&command.refinement);
     let mut text = String::new();
     let mut values = Vec::new();

@@ -3,6 +3,7 @@
 use std::io::Read;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
+use std::time::{Duration, Instant};
 
 use anyhow::{Context, Result, bail};
 use vertex_tree::{CollapseLog, Mesh};
@@ -138,8 +139,12 @@ pub(super) struct Replayable {
     /// Of the input, where it was simplified for this.
     pub built: Option<simplify::Report>,
     pub facts: Vec<(&'static str, String)>,
-    /// A path around it needs its mesh.
-    pub mesh: Mesh,
+    /// The collapse log that it comes from, if not from a file of a backend that pages, which may be larger than memory.
+    pub log: Option<Arc<CollapseLog>>,
+    /// Size of its file, where that is known.
+    pub file_bytes: Option<u64>,
+    /// What writing its file took, where it has been written for this.
+    pub writing: Option<Duration>,
     /// The folder of its file, where it has been written for this: to be kept as long as the subject.
     pub folder: Option<tempfile::TempDir>,
 }
@@ -160,27 +165,43 @@ impl Input {
             }
             let facts = store.facts();
             let subject = Subject::of_store(name, store);
-            let mesh = stage(&format!("{name}: reading"), |_| subject.finest())?;
-            return Ok(vec![Replayable { subject, built: None, facts, mesh, folder: None }]);
+            let file_bytes = Some(std::fs::metadata(path)?.len());
+            let (log, folder) = (None, None);
+            return Ok(vec![Replayable {
+                subject,
+                built: None,
+                facts,
+                log,
+                file_bytes,
+                writing: None,
+                folder,
+            }]);
         }
         let (log, built) = self.log(false)?;
         let log = Arc::new(log);
         let backends = if backends.is_empty() { &[Backend::InMemory] } else { backends };
         let open = |&backend: &Backend| {
-            let (store, folder) = if backend == Backend::InMemory {
-                (Store::in_memory(log.clone())?, None)
-            } else {
-                let folder = tempfile::tempdir()?;
-                let file = folder.path().join("hierarchy");
+            // A log by itself need not be written to be replayed, only to be compared.
+            let (mut store, mut folder, mut file_bytes, mut writing) = (None, None, None, None);
+            if backends.len() > 1 || backend != Backend::InMemory {
+                let temporary = tempfile::tempdir()?;
+                let file = temporary.path().join("hierarchy");
+                let start = Instant::now();
                 stage(&format!("{name}: writing for {}", backend.name()), |_| {
                     store::write(backend, &file, &log, options)
                 })?;
-                (Store::open(&file)?, Some(folder))
-            };
+                writing = Some(start.elapsed());
+                file_bytes = Some(std::fs::metadata(&file)?.len());
+                if backend != Backend::InMemory {
+                    store = Some(Store::open(&file)?);
+                    folder = Some(temporary);
+                }
+            }
+            let store = store.map_or_else(|| Store::in_memory(log.clone()), Ok)?;
             let facts = store.facts();
             let subject = Subject::of_store(name, store);
-            let mesh = log.mesh.clone();
-            Ok(Replayable { subject, built: built.clone(), facts, mesh, folder })
+            let (built, log) = (built.clone(), Some(log.clone()));
+            Ok(Replayable { subject, built, facts, log, file_bytes, writing, folder })
         };
         backends.iter().map(open).collect()
     }

@@ -3,7 +3,10 @@
 use std::path::{Path, PathBuf};
 use std::time::Duration;
 
+use vertex_tree::PageStats;
+
 use super::Run;
+use crate::engine::Limit;
 
 /// Columns of `frames.csv`: one row per scene, path, backend, strategy and frame.
 const FRAMES: [&str; 23] = [
@@ -91,6 +94,16 @@ pub struct Summary {
     pub reads: u64,
     /// Bytes read.
     pub read_bytes: u64,
+    /// Share of the pages fetched ahead that a change has used, in percent; `None` where none was fetched ahead.
+    pub precision: Option<f64>,
+    /// Share of the pages that a change has used and that were fetched ahead, among these and those that were fetched when
+    /// a change had been refused, in percent.
+    pub recall: Option<f64>,
+    /// Frames in which pages that were not there kept the detail down, and those in which that was for want of memory, in
+    /// percent.
+    pub io_limited: f64,
+    /// See [`Self::io_limited`].
+    pub memory_limited: f64,
     /// Most bytes of the hierarchy in memory at once.
     pub peak_resident_bytes: u64,
     /// Where it was looked at: the largest and the mean number of nodes that differ from the oracle, and the share of
@@ -131,6 +144,16 @@ impl Summary {
         let select = sorted(&|r| r.report.select);
         let changes = mean(&|r| r.report.unfolds + r.report.folds);
         let misses = mean(&|r| r.report.misses);
+        // What the first frame reads, nothing could have foreseen.
+        let paged =
+            |f: &dyn Fn(&PageStats) -> u64| run.rows.iter().skip(1).map(|r| f(&r.report.pages)).sum::<u64>();
+        let (ahead, used) = (paged(&|p| p.ahead), paged(&|p| p.ahead_used));
+        let demanded = paged(&|p| p.reads.saturating_sub(p.ahead));
+        let percent = |part: u64, whole: u64| (whole > 0).then(|| 100.0 * part as f64 / whole as f64);
+        let limited = |limit| {
+            let count = run.rows.iter().filter(|r| r.report.limit == limit).count();
+            100.0 * count as f64 / frames.max(1) as f64
+        };
         let wrong: Vec<u64> = run.rows.iter().filter_map(|r| r.wrong).collect();
         Self {
             frames,
@@ -146,6 +169,10 @@ impl Summary {
             miss_percent: if misses > 0.0 { 100.0 * misses / (misses + changes) } else { 0.0 },
             reads: run.rows.iter().map(|r| r.report.pages.reads).sum(),
             read_bytes: run.rows.iter().map(|r| r.report.pages.read_bytes).sum(),
+            precision: percent(used.min(ahead), ahead),
+            recall: percent(used, used + demanded).filter(|_| ahead > 0),
+            io_limited: limited(Limit::Io),
+            memory_limited: limited(Limit::Memory),
             peak_resident_bytes: run.rows.iter().map(|r| r.report.pages.resident_bytes).max().unwrap_or(0),
             wrong: (!wrong.is_empty()).then(|| Wrong {
                 largest: wrong.iter().copied().max().unwrap_or(0),
@@ -170,7 +197,7 @@ pub fn write_frames(file: &Path, runs: &[&Run]) -> Result<(), WriteError> {
                     run.path.clone(),
                     run.backend.to_owned(),
                     run.strategy.name().to_owned(),
-                    run.prefetch.to_owned(),
+                    run.prefetch.name().to_owned(),
                     row.frame.to_string(),
                     r.select.as_nanos().to_string(),
                     r.apply.as_nanos().to_string(),
@@ -209,7 +236,7 @@ pub fn write_summary(file: &Path, runs: &[&Run]) -> Result<(), WriteError> {
                 run.path.clone(),
                 run.backend.to_owned(),
                 run.strategy.name().to_owned(),
-                run.prefetch.to_owned(),
+                run.prefetch.name().to_owned(),
                 s.frames.to_string(),
                 s.select_median.as_nanos().to_string(),
                 s.select_mean.as_nanos().to_string(),

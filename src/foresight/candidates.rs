@@ -41,6 +41,8 @@ struct Glasses {
     /// The time bounds' unit of time is all that is looked ahead.
     rates: Option<Rates>,
     ahead: [Option<Lenses>; MOST_INSTANTS],
+    /// A node may fold because it turns its back, which the filter knows nothing of.
+    has_cones: bool,
 }
 
 impl Candidates {
@@ -53,7 +55,8 @@ impl Candidates {
     ) {
         let Some(now) = Lenses::new(ahead.frame.criterion, ahead.frame.views) else { return };
         let lenses = |instant| if instant < ahead.instants { ahead.lenses(instant) } else { None };
-        let glasses = Glasses { now, rates: reach(ahead), ahead: std::array::from_fn(lenses) };
+        let has_cones = ahead.frame.cones.is_some();
+        let glasses = Glasses { now, rates: reach(ahead), ahead: std::array::from_fn(lenses), has_cones };
         let mut put = |kind, instant: usize, slot| {
             agenda[instant].push(match kind {
                 Kind::Unfold => Change::Unfold(front.node(slot)),
@@ -142,6 +145,7 @@ fn reach(ahead: &Ahead) -> Option<Rates> {
 fn within_reach(block: &Block, used: usize, kind: Kind, glasses: &Glasses) -> u32 {
     let all = ((1_u64 << used) - 1) as u32;
     match &glasses.rates {
+        _ if glasses.has_cones && kind == Kind::Fold => all,
         None => all,
         Some(rates) => all & may_change(block, kind, glasses.now.as_slice(), rates),
     }
@@ -166,10 +170,15 @@ fn sift(
     let mut left = ((1_u64 << *count) - 1) as u32;
     for (instant, lenses) in glasses.ahead.iter().enumerate() {
         let Some(lenses) = lenses.as_ref().filter(|_| left != 0) else { break };
-        for_each_bit(left & may_be_wrong(block, *count, kind, lenses.as_slice()), |lane| {
-            if ahead.is_wrong(instant, kind, &block.bounds(lane)) {
+        let doubtful = match kind {
+            Kind::Fold if glasses.has_cones => left,
+            _ => left & may_be_wrong(block, *count, kind, lenses.as_slice()),
+        };
+        for_each_bit(doubtful, |lane| {
+            let slot = Slot(block.tag[lane]);
+            if ahead.is_wrong(instant, kind, slot, &block.bounds(lane)) {
                 left &= !(1 << lane);
-                put(kind, instant, Slot(block.tag[lane]));
+                put(kind, instant, slot);
             }
         });
     }

@@ -112,7 +112,7 @@ fn damage_and_contradictions_are_told_in_a_line() {
         if backend == "detail-block" {
             // The initial mesh is always there: a quota that holds no block shows nothing else.
             place.succeed(&format!("compare {name} --path descent.path --page-memory 1 --out none"));
-            assert!(place.text("none/frames.csv").contains(",io,"));
+            assert!(place.text("none/frames.csv").contains(",memory,"));
         } else {
             place.fail(&format!("compare {name} --page-memory 1 --out results"), 1, &["memory"]);
         }
@@ -130,4 +130,60 @@ fn damage_and_contradictions_are_told_in_a_line() {
     place.fail("build grid.ply --backend mt-partition --partition 0 -o out", 2, &["partition"]);
     place.fail("compare grid.ply --cache everything", 2, &["p-cc"]);
     place.fail("compare grid.ply --page-memory 12T", 2, &["12T"]);
+}
+
+/// What of a frame does not depend on the machine, by backend, prefetch, strategy and frame.
+fn repeatable(frames: &str) -> BTreeMap<[String; 4], Vec<String>> {
+    let rows = frames.lines().skip(1).map(|line| line.split(',').map(str::to_owned).collect::<Vec<_>>());
+    let key = |cells: &[String]| [&cells[2], &cells[4], &cells[3], &cells[5]].map(Clone::clone);
+    rows.map(|cells| (key(&cells), [&cells[9..15], &cells[16..]].concat())).collect()
+}
+
+#[test]
+fn real_time_is_repeatable_and_checked() {
+    let place = Workplace::new();
+    let backends = PAGING.join(",");
+    let command = format!(
+        "compare grid.ply --backend {backends} --strategy top-down,front,event --prefetch paper,schedule,none \
+         --path descent.path --pixels 20 --fps 60 --store-latency 20ms --store-bandwidth 4M --check"
+    );
+    let said = place.succeed(&format!("{command} --out once"));
+    place.succeed(&format!("{command} --out twice"));
+    let (once, twice) = (place.text("once/frames.csv"), place.text("twice/frames.csv"));
+    let (once, twice) = (repeatable(&once), repeatable(&twice));
+    assert_eq!(once, twice, "virtual time is the same every time");
+    let misses = |row: &[String]| row[5].parse::<u64>().unwrap();
+    for backend in PAGING {
+        for prefetch in ["paper", "schedule", "none"] {
+            let of = |strategy: &str| -> Vec<(String, Vec<String>)> {
+                let is_it = |key: &[String; 4]| key[..3] == [backend, prefetch, strategy];
+                once.iter()
+                    .filter(|(key, _)| is_it(key))
+                    .map(|(key, row)| (key[3].clone(), row.clone()))
+                    .collect()
+            };
+            let event = of("event");
+            assert_eq!(event.len(), 3, "{backend}, {prefetch}");
+            for (other, event) in of("top-down").iter().zip(&event) {
+                // Misses, and the cut.
+                assert_eq!(
+                    (&other.1[5], other.1.last()),
+                    (&event.1[5], event.1.last()),
+                    "{backend}, {prefetch}"
+                );
+            }
+            assert!(said.lines().any(|line| line.starts_with(backend) && line.contains(prefetch)), "{said}");
+        }
+        if backend == "mt-partition" {
+            // All of it is one partition, which the first frame has waited for.
+            continue;
+        }
+        let late: u64 = once.iter().filter(|(key, _)| key[0] == backend).map(|(_, row)| misses(row)).sum();
+        assert!(late > 0, "{backend}: a store of 20 ms was never late");
+    }
+    let page = place.text("once/report.html");
+    assert!(page.contains("a latency of 20ms") && page.contains("misses a frame"));
+    place.fail("compare grid.ply --store-latency 5ms", 2, &["--fps"]);
+    place.fail("compare grid.ply --fps 60 --wall-clock --store-latency 5ms", 2, &["--wall-clock"]);
+    place.fail("compare grid.ply --prefetch oracle", 2, &["paper, schedule, none"]);
 }

@@ -1,0 +1,241 @@
+//! What fetching ahead is worth: misses, bytes, precision and recall of each paper's own scheme and of the engine's
+//! foresight, along real trajectories over real meshes, on virtual time; then what a slow store does to the time of
+//! selection, by the wall clock.
+//!
+//! `cargo bench --bench prefetch [-- MESH...]` prints tables. The meshes are dragon, happy and sierra (four tiles) of the
+//! shared data, or what is found under these names, as collapse logs, in the folder that `FOLDFRONT_LOGS` names.
+
+use std::path::{Path as FilePath, PathBuf};
+use std::sync::Arc;
+use std::sync::atomic::{AtomicU64, Ordering};
+use std::time::Duration;
+
+use foldfront::compare::csv::Summary;
+use foldfront::compare::{Options, Pace, Paging, Run, Subject};
+use foldfront::mesh_io;
+use foldfront::path::import::{self, Mode};
+use foldfront::path::{Path, Pose};
+use foldfront::refine::Strategy;
+use foldfront::simplify;
+use foldfront::store::{self, Backend, BuildOptions, Store};
+use foldfront::vertex_tree::simulated::Simulated;
+use foldfront::vertex_tree::source::{FileSource, PageSource};
+use foldfront::vertex_tree::{Prefetch, read_log};
+
+const DATA: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/../shared/data");
+
+const MESHES: [(&str, &[&str]); 3] = [
+    ("dragon", &["meshes/dragon.ply"]),
+    ("happy", &["meshes/happy.ply"]),
+    ("sierra", &["terrain/N36W119.hgt", "terrain/N36W118.hgt", "terrain/N37W119.hgt", "terrain/N37W118.hgt"]),
+];
+
+/// Name, file, and how it is placed around a mesh and around a terrain.
+const PATHS: [(&str, &str, [Mode; 2]); 3] = [
+    ("drone", "paths/euroc_mh04_drone.txt", [Mode::Orbit, Mode::Fly]),
+    ("car", "paths/kitti_00_car_10hz.txt", [Mode::Orbit, Mode::Walk]),
+    ("flight", "paths/gcanyon_flight_hoppe.txt", [Mode::Orbit, Mode::Fly]),
+];
+
+const BACKENDS: [Backend; 3] = [Backend::MetaNode, Backend::DetailBlock, Backend::MtPartition];
+
+/// Frames of each path, from its middle on, and frames at rest after them.
+const FRAMES: usize = 1200;
+const REST: usize = 240;
+
+const FRAME: Duration = Duration::from_nanos(16_666_667);
+const LATENCY: Duration = Duration::from_millis(5);
+
+/// Times as fast as recorded that the paths are replayed by the wall clock.
+const WALL_FRAME: Duration = Duration::from_millis(4);
+
+fn main() {
+    let wanted: Vec<String> = std::env::args().skip(1).filter(|a| !a.starts_with('-')).collect();
+    for (mesh, files) in MESHES {
+        if wanted.is_empty() || wanted.iter().any(|name| name == mesh) {
+            match hierarchy(mesh, files) {
+                Some(log) => compare(mesh, &log),
+                None => println!("{mesh}: not there"),
+            }
+        }
+    }
+}
+
+fn hierarchy(mesh: &str, files: &[&str]) -> Option<foldfront::CollapseLog> {
+    if let Some(folder) = std::env::var_os("FOLDFRONT_LOGS") {
+        return read_log(&PathBuf::from(folder).join(format!("{mesh}.log"))).ok();
+    }
+    let files: Vec<PathBuf> = files.iter().map(|file| FilePath::new(DATA).join(file)).collect();
+    let input = files.iter().all(|file| file.exists()).then(|| mesh_io::read(&files, &mut |_, _| ()))?;
+    let built = simplify::build(input.expect("a mesh"), &simplify::Options::default(), &mut |_, _| ());
+    Some(built.expect("a mesh").0)
+}
+
+fn compare(mesh: &str, log: &foldfront::CollapseLog) {
+    let folder = tempfile::tempdir().expect("room for files");
+    let walks: Vec<Path> = PATHS
+        .iter()
+        .filter_map(|&(name, file, modes)| {
+            let options =
+                import::Options { mode: modes[usize::from(mesh == "sierra")], ..import::Options::default() };
+            let file = FilePath::new(DATA).join(file);
+            let mut path =
+                file.exists().then(|| import::import(&file, &log.mesh, &options).expect("a trajectory"))?;
+            path.name = name.to_owned();
+            let middle = path.frames.len() / 2;
+            path.frames = path.frames[middle..].iter().copied().take(FRAMES).collect();
+            Some(path)
+        })
+        .collect();
+    for backend in BACKENDS {
+        let file = folder.path().join(backend.name());
+        store::write(backend, &file, log, &BuildOptions::default()).expect("room for files");
+        println!(
+            "\n{mesh}, {}: {:.1} MiB",
+            backend.name(),
+            std::fs::metadata(&file).map_or(0.0, |m| m.len() as f64) / f64::from(1 << 20)
+        );
+        println!(
+            "{:8} {:9} {:>7} {:>7} {:>8} {:>8} {:>7} {:>8} {:>6} {:>6} {:>6} {:>5}",
+            "path",
+            "prefetch",
+            "MiB",
+            "misses",
+            "flips",
+            "miss %",
+            "reads",
+            "KiB",
+            "prec",
+            "rec",
+            "memory",
+            "stop"
+        );
+        let memory: Vec<u64> = walks.iter().map(|walk| virtual_time(&file, mesh, walk)).collect();
+        if let (Some(walk), Some(&page_memory)) = (walks.first(), memory.first()) {
+            wall_clock(&file, mesh, walk, page_memory);
+        }
+    }
+}
+
+fn options(pace: Pace, page_memory: u64, prefetch: Vec<Prefetch>) -> Options {
+    Options {
+        strategies: vec![Strategy::Event],
+        paging: Paging { page_memory, ..Paging::default() },
+        prefetch,
+        pace,
+        ..Options::default()
+    }
+}
+
+/// Twice what the oracle's cut takes at its largest.
+fn memory(subject: &Subject, walk: &Path) -> u64 {
+    let frames: Vec<usize> = (0..walk.frames.len()).step_by(walk.frames.len() / 24).collect();
+    2 * subject
+        .needs(walk, &frames, &options(Pace::Settled, u64::MAX, vec![Prefetch::None]))
+        .expect("a valid file")
+}
+
+/// The path, and its last frame for a while.
+fn with_rest(walk: &Path) -> Path {
+    let mut path = walk.clone();
+    if let Some(&last) = walk.frames.last() {
+        let still = |frame: usize| Pose { time: last.time + frame as f64 / 60.0, ..last };
+        path.frames.extend((1..=REST).map(still));
+    }
+    path
+}
+
+/// Returns the page memory.
+fn virtual_time(file: &FilePath, mesh: &str, walk: &Path) -> u64 {
+    let mut subject = Subject::of_store(mesh, Store::open(file).expect("a valid file"));
+    let page_memory = memory(&subject, walk);
+    let walk = with_rest(walk);
+    let options = options(
+        Pace::Simulated(FRAME, Simulated::with_latency(LATENCY)),
+        page_memory,
+        Prefetch::ALL.to_vec(),
+    );
+    let runs = subject.replay(&walk, 0..walk.frames.len(), &options, &mut |_, _| ()).expect("a valid file");
+    for run in &runs {
+        row(run, page_memory);
+    }
+    page_memory
+}
+
+fn row(run: &Run, page_memory: u64) {
+    let s = Summary::new(run);
+    // The first frame waits for its pages, whatever fetches them.
+    let later = || run.rows.iter().skip(1).map(|row| &row.report);
+    let sum = |f: &dyn Fn(&foldfront::engine::FrameReport) -> u64| later().map(f).sum::<u64>();
+    let (misses, changes) = (sum(&|r| r.misses), sum(&|r| r.unfolds + r.folds));
+    let percent = |share: Option<f64>| share.map_or_else(|| "-".to_owned(), |share| format!("{share:.1}"));
+    let rest = &run.rows[run.rows.len() - REST..];
+    let settles = rest
+        .iter()
+        .rposition(|row| row.report.misses + row.report.unfolds + row.report.folds > 0)
+        .map_or(0, |at| at + 1);
+    println!(
+        "{:8} {:9} {:7.2} {misses:7} {changes:8} {:8.3} {:7} {:8} {:>6} {:>6} {:6.1} {settles:5}",
+        run.path,
+        run.prefetch.name(),
+        page_memory as f64 / f64::from(1 << 20),
+        100.0 * misses as f64 / (misses + changes).max(1) as f64,
+        sum(&|r| r.pages.reads),
+        sum(&|r| r.pages.read_bytes) / 1024,
+        percent(s.precision),
+        percent(s.recall),
+        s.memory_limited,
+    );
+}
+
+/// A store that is slow once it is told to: a first frame is waited for, and shall not take minutes.
+#[derive(Debug)]
+struct SlowLater {
+    source: FileSource,
+    latency_ms: AtomicU64,
+}
+
+impl PageSource for SlowLater {
+    fn name(&self) -> &str {
+        self.source.name()
+    }
+    fn len(&self) -> u64 {
+        self.source.len()
+    }
+    fn read_at(&self, offset: u64, buffer: &mut [u8]) -> std::io::Result<()> {
+        std::thread::sleep(Duration::from_millis(self.latency_ms.load(Ordering::Relaxed)));
+        self.source.read_at(offset, buffer)
+    }
+}
+
+/// Percentiles of the selection time with an instant store and one of 50 ms, real threads.
+fn wall_clock(file: &FilePath, mesh: &str, walk: &Path, page_memory: u64) {
+    for (prefetch, latency) in
+        [(Prefetch::Paper, 0), (Prefetch::Paper, 50), (Prefetch::Schedule, 0), (Prefetch::Schedule, 50)]
+    {
+        let source = FileSource::open(file).expect("a valid file");
+        let source = Arc::new(SlowLater { source, latency_ms: AtomicU64::new(0) });
+        let store = Store::from_source(source.clone()).expect("a valid file");
+        let mut subject = Subject::of_store(mesh, store);
+        let options = options(Pace::WallClock(WALL_FRAME), page_memory, vec![prefetch]);
+        let runs = subject
+            .replay(walk, 0..walk.frames.len(), &options, &mut |_, _| {
+                source.latency_ms.store(latency, Ordering::Relaxed);
+            })
+            .expect("a valid file");
+        let rows = &runs[0].rows[1..];
+        let mut times: Vec<Duration> = rows.iter().map(|row| row.report.select).collect();
+        times.sort_unstable();
+        let at =
+            |share: f64| times[((share * times.len() as f64).ceil() as usize).max(1) - 1].as_secs_f64() * 1e6;
+        println!(
+            "{:8} {:9} store of {latency:2} ms: selection {:6.0} us median, {:6.0} us 99 %, {:6.0} us 99.9 %; {} misses",
+            walk.name,
+            prefetch.name(),
+            at(0.5),
+            at(0.99),
+            at(0.999),
+            rows.iter().map(|row| row.report.misses).sum::<u64>(),
+        );
+    }
+}

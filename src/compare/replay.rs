@@ -1,0 +1,203 @@
+//! One strategy along one path.
+
+use std::ops::Range;
+use std::time::Instant;
+
+use rustc_hash::FxHashSet;
+use vertex_tree::{MeshSink, NodeId, NullSink, PageStats, VertexTree};
+
+use super::{Check, CompareError, Opening, Pace, Row, Subject, WrongCut};
+use crate::active_mesh::ActiveMesh;
+use crate::engine::{Engine, FrameReport, Settings};
+use crate::path::Path;
+use crate::refine::Strategy;
+use crate::settled::Settled;
+use crate::view::View;
+
+pub(super) struct Replay<'a> {
+    pub subject: &'a Subject,
+    pub path: &'a Path,
+    pub frames: Range<usize>,
+    pub views: &'a [View],
+    pub settings: Settings,
+    pub opening: Opening,
+}
+
+/// Rounds of waiting for a first frame: as many as its pages can lie below each other.
+const FIRST_ROUNDS: usize = 200;
+
+impl Replay<'_> {
+    /// Replays the path, and calls `after` with each frame, its view and its report.
+    fn run<T: VertexTree, M: MeshSink>(
+        &self,
+        tree: Settled<T>,
+        mesh: M,
+        mut after: impl FnMut(usize, &mut Engine<Settled<T>, M>, FrameReport) -> Result<(), CompareError>,
+    ) -> Result<(), CompareError> {
+        let wrap = |e| self.subject.tree_error(e);
+        let mut engine = Engine::new(tree, mesh, self.settings).map_err(wrap)?;
+        let mut start = Instant::now();
+        for (at, (frame, view)) in self.frames.clone().zip(self.views).enumerate() {
+            let views = std::slice::from_ref(view);
+            match self.opening.pace {
+                Pace::Settled => {}
+                _ if at == 0 => {
+                    let report = self.first_frame(&mut engine, views)?;
+                    start = Instant::now();
+                    after(frame, &mut engine, report)?;
+                    continue;
+                }
+                Pace::Simulated(time, _) => engine.tree_mut().pass(time).map_err(wrap)?,
+                Pace::WallClock(time) => {
+                    let due = start + time.mul_f64(at as f64);
+                    std::thread::sleep(due.saturating_duration_since(Instant::now()));
+                }
+            }
+            let report = engine.advance(views).map_err(wrap)?;
+            after(frame, &mut engine, report)?;
+        }
+        Ok(())
+    }
+
+    /// A viewer shows nothing before it has what its first frame needs. All of that is reported as one frame.
+    fn first_frame<T: VertexTree, M: MeshSink>(
+        &self,
+        engine: &mut Engine<Settled<T>, M>,
+        views: &[View],
+    ) -> Result<FrameReport, CompareError> {
+        let wrap = |e| self.subject.tree_error(e);
+        let mut all = engine.advance(views).map_err(wrap)?;
+        for _ in 0..FIRST_ROUNDS {
+            if all.misses == 0 {
+                break;
+            }
+            engine.tree_mut().settle().map_err(wrap)?;
+            let report = engine.advance(views).map_err(wrap)?;
+            all = FrameReport {
+                select: all.select + report.select,
+                apply: all.apply + report.apply,
+                tests: all.tests + report.tests,
+                unfolds: all.unfolds + report.unfolds,
+                folds: all.folds + report.folds,
+                forced: all.forced + report.forced,
+                pages: sum(&all.pages, &report.pages),
+                ..report
+            };
+        }
+        Ok(all)
+    }
+
+    pub fn measure<T: VertexTree>(
+        &self,
+        tree: Settled<T>,
+        count: &mut impl FnMut(),
+    ) -> Result<Vec<Row>, CompareError> {
+        let mut rows = Vec::with_capacity(self.views.len());
+        self.run(tree, ActiveMesh::new(), |frame, engine, report| {
+            engine.mesh_mut().clear_changes();
+            rows.push(Row { frame, report, wrong: None });
+            count();
+            Ok(())
+        })?;
+        Ok(rows)
+    }
+
+    /// Compares every frame with brute force. What a store on virtual time refuses is the same as when that was measured.
+    pub fn check<T: VertexTree>(
+        &self,
+        tree: Settled<T>,
+        check: &mut Check,
+        rows: &mut [Row],
+        count: &mut impl FnMut(),
+    ) -> Result<(), CompareError> {
+        let mut rows = rows.iter_mut();
+        self.run(tree, NullSink, |frame, engine, report| {
+            // What is carried over or blocked is not wrong, it is late, and what was refused keeps back just what depends
+            // on it.
+            let is_exact = self.settings.strategy.is_exact() && report.carried + report.blocked == 0;
+            let (scene, path) = (self.subject.name.clone(), self.path.name.clone());
+            let wrong = match check {
+                Check::Log(oracle) => {
+                    let difference = oracle.compare(engine);
+                    if let Some(difference) = difference.filter(|_| is_exact && report.misses == 0) {
+                        return Err(CompareError::Wrong(Box::new(WrongCut {
+                            scene,
+                            path,
+                            frame,
+                            strategy: self.settings.strategy,
+                            difference,
+                            views: engine.views().to_vec(),
+                            criterion: self.settings.criterion,
+                        })));
+                    }
+                    difference.map_or(0, |d| d.count as u64)
+                }
+                Check::Nodes(brute_force) => {
+                    let wrong = brute_force.wrong(engine);
+                    let has_dependencies = self.subject.has_dependencies(&self.opening.paging);
+                    let unexplained = match report.misses {
+                        0 => wrong,
+                        _ => brute_force.unexplained(engine, has_dependencies),
+                    };
+                    if unexplained > 0 && is_exact {
+                        let (strategy, backend) =
+                            (self.settings.strategy.name(), self.subject.backend().name());
+                        let wrong = unexplained;
+                        return Err(CompareError::Differs { scene, path, frame, strategy, backend, wrong });
+                    }
+                    wrong
+                }
+            };
+            if let Some(row) = rows.next() {
+                row.wrong = Some(wrong);
+            }
+            count();
+            Ok(())
+        })
+    }
+
+    /// Compares every frame with the cut of an exact strategy that waits for its pages.
+    pub fn compare<T: VertexTree>(
+        &self,
+        tree: Settled<T>,
+        beside: Settled<T>,
+        rows: &mut [Row],
+        count: &mut impl FnMut(),
+    ) -> Result<(), CompareError> {
+        let wrap = |e| self.subject.tree_error(e);
+        let settings = Settings { strategy: Strategy::Front, ..self.settings };
+        let mut exact = Engine::new(beside, NullSink, settings).map_err(wrap)?;
+        let mut rows = rows.iter_mut();
+        let mut active: FxHashSet<NodeId> = FxHashSet::default();
+        self.run(tree, NullSink, |_, engine, _| {
+            exact.advance(engine.views()).map_err(wrap)?;
+            let mut wrong = 0;
+            if exact.front().cut_hash() != engine.front().cut_hash() {
+                active.clear();
+                exact.for_each_active(|node| {
+                    active.insert(node);
+                });
+                engine.for_each_active(|node| wrong += u64::from(!active.remove(&node)));
+                wrong += active.len() as u64;
+            }
+            if let Some(row) = rows.next() {
+                row.wrong = Some(wrong);
+            }
+            count();
+            Ok(())
+        })
+    }
+}
+
+/// What paging did in two frames.
+fn sum(a: &PageStats, b: &PageStats) -> PageStats {
+    PageStats {
+        reads: a.reads + b.reads,
+        read_bytes: a.read_bytes + b.read_bytes,
+        resident_bytes: b.resident_bytes,
+        faults: a.faults + b.faults,
+        ahead: a.ahead + b.ahead,
+        ahead_used: a.ahead_used + b.ahead_used,
+        no_room: b.no_room,
+    }
+}
