@@ -71,9 +71,6 @@ pub fn table() {
     }
 }
 
-/// Calls its second argument with pages that a node is to be counted on.
-type PagesOf<'a> = dyn Fn(NodeId, &mut dyn FnMut(u32)) + 'a;
-
 fn trace(
     file: &std::sync::Arc<MetaNodeFile>,
     views: &[View],
@@ -107,33 +104,28 @@ fn trace(
         trace.frames.resize(frame as usize, Vec::new());
         if frame % 10 == 0 {
             let is_active = |node: NodeId| active[node.index()] == frame;
-            let mut count = |mark: u32, f: &PagesOf| {
-                let mut count = 0;
-                for &node in &now {
-                    f(node, &mut |page| {
-                        if std::mem::replace(&mut seen[page as usize], mark) != mark {
-                            count += 1;
-                        }
-                    });
-                }
-                count
-            };
             let tree = engine.tree();
+            let mut count = |mark: u32, pages: &mut dyn Iterator<Item = u32>| {
+                pages.filter(|&page| std::mem::replace(&mut seen[page as usize], mark) != mark).count()
+            };
+            let folded_below = |node: NodeId| tree.children(node).filter(|&child| !is_active(child));
+            let is_collapsible = |node: NodeId| !tree.children(node).any(is_active);
             // Leaves count on the page of their parent: a node with one child that is a node has a leaf below it.
-            let in_front = count(2 * frame, &|node, found| {
-                let children: Vec<NodeId> = tree.children(node).collect();
-                children.iter().filter(|&&child| !is_active(child)).for_each(|child| found(child.0 / slots));
-                if children.len() < 2 {
-                    found(node.0 / slots);
-                }
-            });
-            let can_change = count(2 * frame + 1, &|node, found| {
-                let children: Vec<NodeId> = tree.children(node).collect();
-                children.iter().filter(|&&child| !is_active(child)).for_each(|child| found(child.0 / slots));
-                if !children.iter().any(|&child| is_active(child)) {
-                    found(node.0 / slots);
-                }
-            });
+            let has_leaf = |node: NodeId| tree.children(node).count() < 2;
+            let in_front = count(
+                2 * frame,
+                &mut now.iter().flat_map(|&node| {
+                    let own = has_leaf(node).then_some(node);
+                    folded_below(node).chain(own).map(|node| node.0 / slots)
+                }),
+            );
+            let can_change = count(
+                2 * frame + 1,
+                &mut now.iter().flat_map(|&node| {
+                    let own = is_collapsible(node).then_some(node);
+                    folded_below(node).chain(own).map(|node| node.0 / slots)
+                }),
+            );
             trace.in_front.push(in_front);
             trace.can_change.push(can_change);
         }
