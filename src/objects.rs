@@ -11,6 +11,8 @@
 //! What the objects share is up to their backends: trees of `mt-partition` take clones of one memory budget and one reader.
 
 mod scene_file;
+#[cfg(feature = "mt-partition")]
+mod stored;
 
 use std::time::Duration;
 
@@ -21,6 +23,8 @@ use crate::engine::{Engine, FrameReport, Limit, Settings};
 use crate::view::View;
 
 pub use scene_file::{SceneFileError, read_scene};
+#[cfg(feature = "mt-partition")]
+pub use stored::{StoredScene, StoredSceneError};
 
 /// Where an object is in the scene: scaled, then turned, then moved.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -204,6 +208,14 @@ impl<T: VertexTree, M: MeshSink> Objects<T, M> {
             }
         }
         failure.map_or(Ok(all), Err)
+    }
+
+    /// Lets time pass for stores on virtual time.
+    ///
+    /// # Errors
+    /// The first that a backend reports.
+    pub fn pass(&mut self, time: Duration) -> Result<(), TreeError> {
+        self.objects.iter_mut().try_for_each(|object| object.engine.tree_mut().pass(time))
     }
 
     /// Waits until every page that has been asked for has arrived or failed.

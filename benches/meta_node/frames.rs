@@ -99,7 +99,9 @@ pub fn table() {
                     first.major_faults[1],
                     first.major_faults[0],
                 );
-                if is_virtual {
+                if frames < walk.frames.len() {
+                    println!("{:22} ended after {PATIENCE:?}: no ratio is taken of it", "");
+                } else if is_virtual {
                     let best = best_virtual.get_or_insert([f64::MAX; 2]);
                     (best[0], best[1]) = (best[0].min(mean), best[1].min(p99));
                 } else if let Some(best) = best_virtual {

@@ -13,6 +13,7 @@
 //! Frames are settled: each waits for its pages, and its cut is compared between modes; another cut fails the benchmark.
 
 mod figures;
+mod selection;
 
 use std::path::PathBuf;
 use std::sync::Arc;
@@ -32,7 +33,7 @@ use mt_partition::{BuildOptions, CacheMode, MtFile, MtTree, WriteReport};
 fn main() {
     let words: Vec<String> = std::env::args().skip(1).filter(|a| !a.starts_with("--")).collect();
     let experiments = ["reduction", "figures", "selection"];
-    let models = ["armadillo_100k", "dragon"];
+    let models = ["armadillo_100k", "dragon", "happy"];
     let is_chosen = |name: &&&str, among: &[&str]| {
         let is_named = |name: &str| words.iter().any(|word| name.contains(word.as_str()));
         !among.iter().any(|name| is_named(name)) || is_named(name)
@@ -44,7 +45,7 @@ fn main() {
             match experiment {
                 "reduction" => reduction(&log),
                 "figures" => figures::figures(model, &log),
-                _ => selection(&log),
+                _ => selection::selection(&log),
             }
         }
     }
@@ -191,82 +192,5 @@ fn reduction(log: &CollapseLog) {
             ratios[ratios.len() / 2],
             ratios[ratios.len() - 1],
         );
-    }
-}
-
-/// Each replay is made this often; of each frame the least time counts.
-const ROUNDS: usize = 5;
-
-fn selection(log: &CollapseLog) {
-    let (file, _) = build(log, &BuildOptions::default());
-    let hierarchy = Arc::new(Hierarchy::new(log).expect("a log"));
-    for path in [near(&log.mesh), turning(&log.mesh)] {
-        let views = views(&path);
-        for strategy in [Strategy::TopDown, Strategy::Front, Strategy::Event] {
-            let settings = settings(&path, strategy);
-            let plain = least(&views, || {
-                Engine::new(InMemoryTree::new(hierarchy.clone()), NullSink, settings).expect("in memory")
-            });
-            let grouped = least(&views, || {
-                let mut engine =
-                    Engine::new(tree(&file, CacheMode::PCc), NullSink, settings).expect("a whole file");
-                // Everything that the path needs is in memory before the clock is looked at, and stays: the cut has been
-                // everywhere, and nothing is let go of while something of its partition is in the cut.
-                replay(&mut engine, &views[..1], |_, _| {});
-                engine
-            });
-            println!(
-                "{}, {}: single collapses {:.2} ns a triangle displayed ({:.1} us a frame, {:.0} triangles, {:.0} tests, \
-                 {:.0} changes), groups {:.2} ns ({:.1} us, {:.0}, {:.0}, {:.0}): {:.1} times less",
-                path.name,
-                strategy.name(),
-                plain.ns / plain.triangles,
-                plain.ns / 1e3,
-                plain.triangles,
-                plain.tests,
-                plain.changes,
-                grouped.ns / grouped.triangles,
-                grouped.ns / 1e3,
-                grouped.triangles,
-                grouped.tests,
-                grouped.changes,
-                (plain.ns / plain.triangles) / (grouped.ns / grouped.triangles),
-            );
-        }
-    }
-}
-
-/// Means over the frames.
-struct Figures {
-    ns: f64,
-    triangles: f64,
-    tests: f64,
-    changes: f64,
-}
-
-fn least<T: VertexTree>(views: &[View], engine: impl Fn() -> Engine<T, NullSink>) -> Figures {
-    let mut least: Vec<FrameReport> = Vec::new();
-    for _ in 0..ROUNDS {
-        let mut engine = engine();
-        let mut at = 0;
-        // The last of a frame's advances, in which nothing is missing, is the one that counts; most frames have no other.
-        replay(&mut engine, views, |report, _| {
-            if at == least.len() {
-                least.push(*report);
-            } else if report.select < least[at].select {
-                least[at] = *report;
-            }
-            at += 1;
-        });
-    }
-    // The first frame unfolds the whole cut.
-    let frames = &least[1..];
-    let mean =
-        |f: &dyn Fn(&FrameReport) -> u64| frames.iter().map(f).sum::<u64>() as f64 / frames.len() as f64;
-    Figures {
-        ns: mean(&|r| r.select.as_nanos() as u64),
-        triangles: mean(&|r| r.triangles),
-        tests: mean(&|r| r.tests),
-        changes: mean(&|r| r.unfolds + r.folds),
     }
 }

@@ -176,7 +176,8 @@ pub fn build_within(
         next_id: 0,
         stop: limits.stop,
         threads: limits.threads.max(1),
-        window_bytes: memory - memory / 8,
+        // The allocator keeps memory back for each thread that has freed it.
+        window_bytes: if limits.threads > 1 { memory / 8 * 5 } else { memory - memory / 8 },
         sort_bytes: (memory / 32) as usize,
         log: Log::new(&scratch).map_err(temporary)?,
         scratch,

@@ -184,7 +184,8 @@ fn a_camera_that_stops_gets_its_cut() {
     let mut cut = GraphCut::new(&file);
     for prefetch in Prefetch::ALL {
         // How many reads lead to one another, and what they bring: where nothing takes time.
-        let mut at_once = engine(&file, prefetch, Memory::default(), Simulated::with_latency(Duration::ZERO));
+        let no_time = Simulated::with_latency(Duration::ZERO);
+        let mut at_once = engine(&file, Prefetch::None, Memory::default(), no_time);
         let mut arrive = |view: &View| {
             let (mut depth, mut bytes) = (0, 0);
             loop {

@@ -22,6 +22,7 @@
 //! ```
 
 mod arrange;
+mod arranging;
 mod blocking;
 mod board;
 mod dependencies;

@@ -185,6 +185,32 @@ fn of_two_pages_the_nearer_one_wins() {
     assert!(!tree.is_resident(nodes[99 + there.len()]));
 }
 
+/// However near is what is foreseen: it may be what the refused change leads to, and would wait for it forever.
+#[test]
+fn what_is_refused_comes_before_all_that_is_foreseen() {
+    let file = file();
+    let nodes = page_by_page(&file);
+    let mut tree = tree(&file, Prefetch::Schedule, 4, 1, 32);
+    let say = |tree: &mut MetaNodeTree| (100..140).for_each(|page| tree.will_need(nodes[page], 1));
+    // Memory is full of what is foreseen.
+    for _ in 0..10 {
+        frame(&mut tree, say);
+        tree.pass(2 * MS).unwrap();
+    }
+    for _ in 0..10 {
+        let (step, _) = frame(&mut tree, |tree| {
+            let step = tree.unfold(nodes[30], &mut NullSink).unwrap();
+            say(tree);
+            step
+        });
+        if step == Step::Done {
+            return;
+        }
+        tree.pass(2 * MS).unwrap();
+    }
+    panic!("the page never came");
+}
+
 /// A page that is asked for while it is on its way ahead of time is read once, and was asked for.
 #[test]
 fn a_page_under_way_is_read_once() {
@@ -209,7 +235,8 @@ fn a_page_under_way_is_read_once() {
     assert_eq!((sum.reads, sum.ahead, sum.ahead_used), (2, 0, 0));
 }
 
-/// Four place holders for everything: every way of prefetching gets there in the end, and then nothing moves any more.
+/// Four place holders for everything: every way of prefetching gets there in the end, and then nothing moves any more. What
+/// is wanted and has been refused is named in every frame, with what is known below it, as an engine at rest does.
 #[test]
 fn with_little_memory_a_front_at_rest_comes_to_rest() {
     let file = file();
@@ -218,7 +245,18 @@ fn with_little_memory_a_front_at_rest_comes_to_rest() {
         let mut front = Front::new(&tree);
         let mut sum = PageStats::default();
         for _ in 0..20_000 {
-            let ((done, refused), stats) = frame(&mut tree, |tree| front.unfold(tree));
+            let ((done, refused), stats) = frame(&mut tree, |tree| {
+                let moved = front.unfold(tree);
+                if tree.look_ahead() > 0 {
+                    let mut below = Vec::new();
+                    for &node in &front.boundary {
+                        tree.will_need(node, 1);
+                        tree.peek(node, &mut below);
+                    }
+                    below.iter().for_each(|&(node, _)| tree.will_need(node, 1));
+                }
+                moved
+            });
             tree.pass(2 * MS).unwrap();
             add(&mut sum, stats);
             if done + refused == 0 {

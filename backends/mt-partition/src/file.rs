@@ -271,6 +271,18 @@ impl MtFile {
         })
     }
 
+    /// Bytes that a node takes in memory.
+    #[must_use]
+    pub fn memory_of(&self, node: NodeId) -> u64 {
+        self.length(node.0) + crate::residents::OVERHEAD
+    }
+
+    /// The partition that a node is in.
+    #[must_use]
+    pub fn partition(&self, node: NodeId) -> u32 {
+        self.partition_of(node.0)
+    }
+
     pub(crate) fn offset(&self, node: u32) -> u64 {
         self.offsets[node as usize]
     }

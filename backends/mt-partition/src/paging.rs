@@ -105,6 +105,8 @@ pub(crate) struct Paging {
     has_told: bool,
     /// Frames in a row in which room was wanted that could not be had by letting go of what no cut holds.
     pressed: u32,
+    /// Whether nodes go for want of room only, whatever the cache mode.
+    keeps_all: bool,
     /// What the engine foresees, where that is asked for.
     foresight: Option<Foresight>,
     stats: PageStats,
@@ -142,6 +144,7 @@ impl Paging {
             answers: Vec::new(),
             unanswered_frames: 0,
             pressed: 0,
+            keeps_all: false,
             foresight: (prefetch == Prefetch::Schedule).then(Foresight::default),
             stats: PageStats::default(),
             is_lost: false,
@@ -189,6 +192,9 @@ impl Paging {
     }
 
     fn mark(&mut self, partition: u32) {
+        if self.keeps_all {
+            return;
+        }
         if !std::mem::replace(&mut self.partitions[partition as usize].is_dirty, true) {
             self.dirty.push(partition);
         }
@@ -332,6 +338,28 @@ impl Paging {
         self.line.settle(|answer| answers.push(answer));
     }
 
+    /// Asks for everything that there is room for, and from now on lets go of nothing unless room is needed.
+    pub fn load_all(&mut self) {
+        self.keeps_all = true;
+        self.dirty.clear();
+        let units =
+            if self.mode.reads_partitions() { self.partitions.len() as u32 } else { self.file.nodes() };
+        for unit in 0..units {
+            let is_missing = |n: &u32| !self.residents.contains(*n) && !self.reserved.contains(n);
+            let missing: Vec<u32> = self.nodes_of(unit).filter(is_missing).collect();
+            if self.is_paused(unit) || missing.is_empty() {
+                continue;
+            }
+            if !self.residents.memory().try_reserve(missing.iter().map(|&n| self.bytes_of(n)).sum()) {
+                return;
+            }
+            self.reserved.extend(missing);
+            if !self.ask(unit, u64::MAX, None) {
+                self.release_reserved(unit);
+            }
+        }
+    }
+
     /// Lets time pass, where it is virtual.
     pub fn pass(&mut self, time: Duration) {
         self.line.pass(time);
@@ -353,7 +381,10 @@ impl Paging {
             }
         }
         self.deferred = deferred;
-        self.fetch_ahead();
+        // What is foreseen may not take the room that a refused change waits for.
+        if self.wanted == 0 && self.first.is_none() {
+            self.fetch_ahead();
+        }
         if self.wanted > 0 || self.has_told {
             self.residents.memory().want(self.member, self.wanted);
             self.has_told = self.wanted > 0;

@@ -27,6 +27,8 @@ pub(crate) struct Reduction {
     /// For each collapse, the node that it went into; itself, if it stands for a node.
     into: Vec<u32>,
     reach: Vec<f32>,
+    /// For each node, the triangles on its outgoing and on its ingoing arcs.
+    sizes: Vec<[u32; 2]>,
     stamp: Vec<u32>,
     arcs: u64,
     triangles: u64,
@@ -51,6 +53,7 @@ impl Reduction {
         let (arcs, triangles) = graph.totals();
         let reach = |b: &Bounds| (f64::from(b.radius) + REACH * f64::from(b.eps)) as f32;
         let mut reduction = Self {
+            sizes: (0..nodes as u32).map(|n| [graph.fine(n), graph.coarse(n)]).collect(),
             graph,
             order: Order::descending(nodes),
             into: (0..nodes as u32).collect(),
@@ -79,11 +82,18 @@ impl Reduction {
                 queue.push(Reverse(self.candidate(upper, lower)));
             }
         }
+        let mut most = 2 * queue.len();
         while !self.is_reduced(patch) {
-            let Some(Reverse(Candidate { upper, lower, stamps, .. })) = queue.pop() else { break };
-            if [upper, lower].map(|n| self.stamp[n as usize]) != stamps {
+            if queue.len() > most {
+                // Those that are out of date would never come up, and make the way of the others longer.
+                queue.retain(|Reverse(candidate)| self.is_current(candidate));
+                most = (2 * queue.len()).max(LEAST);
+            }
+            let Some(Reverse(candidate)) = queue.pop() else { break };
+            if !self.is_current(&candidate) {
                 continue;
             }
+            let Candidate { upper, lower, .. } = candidate;
             if !self.order.merge(&self.graph, upper, lower) {
                 self.refused += 1;
                 continue;
@@ -98,6 +108,10 @@ impl Reduction {
                 queue.push(Reverse(self.candidate(parent, upper)));
             }
         }
+    }
+
+    fn is_current(&self, candidate: &Candidate) -> bool {
+        [candidate.upper, candidate.lower].map(|n| self.stamp[n as usize]) == candidate.stamps
     }
 
     fn candidate(&self, upper: u32, lower: u32) -> Candidate {
@@ -117,7 +131,8 @@ impl Reduction {
     fn key(&self, upper: u32, lower: u32) -> f64 {
         let reach = f64::from(self.reach[upper as usize]);
         let extra = |node: u32| {
-            let gain = f64::from(self.graph.fine(node)) - f64::from(self.graph.coarse(node));
+            let [fine, coarse] = self.sizes[node as usize].map(f64::from);
+            let gain = fine - coarse;
             let growth = reach / f64::from(self.reach[node as usize]).max(f64::MIN_POSITIVE);
             // The logarithm, near enough for an order and the same on every machine.
             let growth = growth.max(1.0);
@@ -125,7 +140,7 @@ impl Reduction {
         };
         let others = self.graph.parents[lower as usize].iter().filter(|p| p.node != upper);
         let cost: f64 = extra(lower) + others.clone().map(|p| extra(p.node)).sum::<f64>();
-        let size = f64::from(self.graph.fine(upper)) + f64::from(self.graph.fine(lower));
+        let size = f64::from(self.sizes[upper as usize][0]) + f64::from(self.sizes[lower as usize][0]);
         cost + SIZE * size
     }
 
@@ -135,6 +150,10 @@ impl Reduction {
         self.stamp[u] += 1;
         self.stamp[l] += 1;
         self.reach[u] = self.reach[u].max(self.reach[l]);
+        // What lies between the two is on an outgoing arc of the one and on an ingoing one of the other.
+        let between =
+            self.graph.parents[l].iter().find(|arc| arc.node == upper).map_or(0, |arc| arc.triangles);
+        self.sizes[u] = [0, 1].map(|i| self.sizes[u][i] + self.sizes[l][i] - between);
         let graph = &mut self.graph;
         self.arcs -= 1;
         let children = std::mem::take(&mut graph.children[l]);
@@ -181,6 +200,9 @@ impl Reduction {
         nodes
     }
 }
+
+/// Candidates below which it is not worth looking for those that are out of date.
+const LEAST: usize = 1 << 12;
 
 /// Weight of a triangle of the merged node against one that is shown too early: see DESIGN.md for what others gave.
 const SIZE: f64 = 0.05;

@@ -87,6 +87,12 @@ impl MtTree {
         self.paging.residents.bytes()
     }
 
+    /// Asks for all nodes, as far as there is room for them, and lets go of nothing from now on unless room is needed,
+    /// whatever the cache mode: for a viewer with memory for everything. See [`settle`](VertexTree::settle).
+    pub fn load_all(&mut self) {
+        self.paging.load_all();
+    }
+
     /// The input vertex that is shown in a slot; `None` in a hole, and for a sink that does not keep the mesh.
     #[must_use]
     pub fn input_vertex(&self, vertex: VertexId) -> Option<u32> {

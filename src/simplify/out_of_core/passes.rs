@@ -136,7 +136,7 @@ impl Passes<'_> {
             vanished: 0,
             roots: 0,
         };
-        let mut pass = Pass {
+        let pass = Pass {
             work,
             whole: &self.whole,
             window_bytes: self.window_bytes / threads as u64,
@@ -171,8 +171,7 @@ impl Passes<'_> {
                 next_id = pass.run(blocks, next_id, &mut rings, &failed)?;
             }
         }
-        // Nothing else is in memory now.
-        pass.window_bytes = self.window_bytes;
+        // In windows no larger than those before: the allocator keeps back what other threads have freed.
         next_id = pass.run(&borders, next_id, &mut rings, &failed)?;
         let totals = pass.totals.into_inner();
         let (round, kept, collapses) = (totals.round, totals.kept, totals.collapses);

@@ -26,7 +26,7 @@ impl Pager {
         for Done { command, result } in done.drain(..) {
             match result {
                 Ok(layout) => self.arrive(command, layout),
-                Err(fault) => self.fail(command, fault),
+                Err(fault) => self.fail(&command, fault),
             }
         }
         self.done = done;
@@ -54,11 +54,11 @@ impl Pager {
         }
     }
 
-    fn fail(&mut self, command: Command, fault: MetaNodeError) {
+    fn fail(&mut self, command: &Command, fault: MetaNodeError) {
         let page = command.page;
         self.stats.faults += 1;
         self.last_fault = Some(fault);
-        self.release(&command);
+        self.release(command);
         // Asked for again, but not in every frame forever.
         let failure = self.failures.entry(page).or_default();
         failure.until = self.frame + (1 << failure.times.min(63)).min(LONGEST_REST) - 1;

@@ -198,7 +198,7 @@ impl Pager {
         if self.evict_one(self.unused()) || self.withdraw(false) {
             return true;
         }
-        let farthest = self.farthest(self.frame, self.frame);
+        let farthest = self.farthest(self.frame, 0);
         let is_up = switch == Switch::Up;
         self.evict_one(farthest.or_else(|| self.takeable(Class::InUse, self.frame).filter(|_| is_up)))
     }

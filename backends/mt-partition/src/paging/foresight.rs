@@ -156,7 +156,7 @@ impl Paging {
             self.reads.iter().filter(|(_, r)| r.waiting.is_empty()).map(|(&u, _)| u).collect();
         idle.sort_unstable();
         for unit in idle {
-            if units.binary_search_by_key(&unit, |u| u.1).is_err() {
+            if !self.keeps_all && units.binary_search_by_key(&unit, |u| u.1).is_err() {
                 self.withdraw(unit);
             }
         }

@@ -1,0 +1,128 @@
+//! What finding and making the changes takes, against hierarchies of single collapses: in memory, and in meta-nodes.
+
+use std::path::PathBuf;
+use std::sync::Arc;
+
+use foldfront::CollapseLog;
+use foldfront::engine::{Engine, FrameReport};
+use foldfront::path::import::{Mode, Options, import};
+use foldfront::path::{self, Path};
+use foldfront::refine::Strategy;
+use foldfront::vertex_tree::source::FileSource;
+use foldfront::vertex_tree::{NullSink, VertexTree};
+use foldfront::view::View;
+use in_memory::{Hierarchy, InMemoryTree};
+use meta_node::{MetaNodeFile, MetaNodeTree};
+use mt_partition::{BuildOptions, CacheMode};
+
+use crate::{build, folder, replay, settings, tree, views};
+
+/// Each replay is made this often, in turn; of each frame the least time counts.
+const ROUNDS: usize = 5;
+/// Frames of a path, from its start.
+const FRAMES: usize = 1200;
+
+pub fn selection(log: &CollapseLog) {
+    let (file, _) = build(log, &BuildOptions::default());
+    let hierarchy = Arc::new(Hierarchy::new(log).expect("a log"));
+    let meta_file = meta_nodes(log);
+    for path in paths(log) {
+        let mut views = views(&path);
+        views.truncate(FRAMES);
+        for strategy in [Strategy::TopDown, Strategy::Front, Strategy::Event] {
+            let settings = settings(&path, strategy);
+            let mut figures = [const { Vec::new() }; 3];
+            for _ in 0..ROUNDS {
+                let plain = InMemoryTree::new(hierarchy.clone());
+                least(&mut figures[0], &views, Engine::new(plain, NullSink, settings).expect("in memory"));
+                let mut meta = MetaNodeTree::new(meta_file.clone(), meta_node::Settings::default())
+                    .expect("memory for everything");
+                meta.load_all();
+                meta.settle().expect("a whole file");
+                least(&mut figures[1], &views, Engine::new(meta, NullSink, settings).expect("a whole file"));
+                let mut groups = tree(&file, CacheMode::PCc);
+                groups.load_all();
+                groups.settle().expect("a whole file");
+                least(
+                    &mut figures[2],
+                    &views,
+                    Engine::new(groups, NullSink, settings).expect("a whole file"),
+                );
+            }
+            let [plain, meta, groups] = figures.map(|frames| Figures::new(&frames));
+            println!("{}, {}:", path.name, strategy.name());
+            for (name, f) in [("in-memory", &plain), ("meta-node", &meta), ("mt-partition", &groups)] {
+                println!(
+                    "  {name:12}: {:.3} ns a triangle displayed, {:.2} us a frame, {:.0} triangles, {:.0} tests, {:.1} changes; \
+                     meta-node : this, {:.2} by triangle, {:.2} by frame",
+                    f.ns / f.triangles,
+                    f.ns / 1e3,
+                    f.triangles,
+                    f.tests,
+                    f.changes,
+                    (meta.ns / meta.triangles) / (f.ns / f.triangles),
+                    meta.ns / f.ns,
+                );
+            }
+        }
+    }
+}
+
+/// A flight that was recorded, and a calm turn.
+fn paths(log: &CollapseLog) -> Vec<Path> {
+    let file =
+        PathBuf::from(concat!(env!("CARGO_MANIFEST_DIR"), "/../shared/data/paths/euroc_mh04_drone.txt"));
+    let options = Options { mode: Mode::Fly, rate: 60.0, ..Options::default() };
+    let mut paths = vec![path::around(&log.mesh)];
+    if file.exists() {
+        paths.insert(0, import(&file, &log.mesh, &options).expect("a valid trajectory"));
+    }
+    paths
+}
+
+fn meta_nodes(log: &CollapseLog) -> Arc<MetaNodeFile> {
+    let path = folder().join("experiment.meta");
+    meta_node::write(&path, log, &meta_node::BuildOptions::default()).expect("target is writable");
+    let source = FileSource::open(&path).expect("it was just written");
+    Arc::new(MetaNodeFile::open(Arc::new(source)).expect("it was just written"))
+}
+
+/// Means over the frames.
+struct Figures {
+    ns: f64,
+    triangles: f64,
+    tests: f64,
+    changes: f64,
+}
+
+impl Figures {
+    fn new(frames: &[FrameReport]) -> Self {
+        // The first frame unfolds the whole cut.
+        let frames = &frames[1..];
+        let mean =
+            |f: &dyn Fn(&FrameReport) -> u64| frames.iter().map(f).sum::<u64>() as f64 / frames.len() as f64;
+        Self {
+            ns: mean(&|r| r.select.as_nanos() as u64),
+            triangles: mean(&|r| r.triangles),
+            tests: mean(&|r| r.tests),
+            changes: mean(&|r| r.unfolds + r.folds),
+        }
+    }
+}
+
+/// Replays, and keeps the least time of each frame: of the last advance of a frame, in which nothing is missing; most frames
+/// have no other.
+fn least<T: VertexTree>(least: &mut Vec<FrameReport>, views: &[View], mut engine: Engine<T, NullSink>) {
+    let mut at = 0;
+    replay(&mut engine, views, |report, _| {
+        if at == least.len() {
+            least.push(*report);
+        } else {
+            assert_eq!(least[at].cut_hash, report.cut_hash, "another cut");
+            if report.select < least[at].select {
+                least[at] = *report;
+            }
+        }
+        at += 1;
+    });
+}
