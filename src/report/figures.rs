@@ -1,8 +1,8 @@
 //! The curves of a report.
 
 use super::Section;
-use crate::compare::Run;
 use crate::compare::csv::Summary;
+use crate::compare::{Row, Run};
 use crate::engine::FrameReport;
 use crate::plot::{self, Line, Plot, PlotError, Series};
 use crate::refine::Strategy;
@@ -14,6 +14,8 @@ pub(super) struct Quantity {
     label: &'static str,
     logarithmic: bool,
     median_window: usize,
+    /// Whether the first frame, which reads the whole cut, would flatten all others.
+    leaves_out_first: bool,
     value: fn(&FrameReport) -> f64,
 }
 
@@ -22,6 +24,7 @@ pub(super) const SELECTION: Quantity = Quantity {
     label: "selection time, ms",
     logarithmic: true,
     median_window: 15,
+    leaves_out_first: false,
     value: |report| report.select.as_secs_f64() * 1e3,
 };
 
@@ -30,6 +33,7 @@ pub(super) const TESTS: Quantity = Quantity {
     label: "tests a frame",
     logarithmic: true,
     median_window: 15,
+    leaves_out_first: false,
     value: |report| report.tests as f64,
 };
 
@@ -38,6 +42,7 @@ pub(super) const CHANGES: Quantity = Quantity {
     label: "changes a frame",
     logarithmic: true,
     median_window: 15,
+    leaves_out_first: false,
     value: |report| (report.unfolds + report.folds) as f64,
 };
 
@@ -45,23 +50,26 @@ pub(super) const CHANGES: Quantity = Quantity {
 pub(super) const PAGING: [Quantity; 4] = [
     Quantity {
         name: "misses",
-        label: "misses a frame",
+        label: "misses a frame (without the first)",
         logarithmic: false,
         median_window: 0,
+        leaves_out_first: true,
         value: |report| report.misses as f64,
     },
     Quantity {
         name: "reads",
-        label: "reads a frame",
+        label: "reads a frame (without the first)",
         logarithmic: false,
         median_window: 15,
+        leaves_out_first: true,
         value: |report| report.pages.reads as f64,
     },
     Quantity {
         name: "bytes read",
-        label: "KiB read a frame",
+        label: "KiB read a frame (without the first)",
         logarithmic: false,
         median_window: 15,
+        leaves_out_first: true,
         value: |report| report.pages.read_bytes as f64 / 1024.0,
     },
     Quantity {
@@ -69,6 +77,7 @@ pub(super) const PAGING: [Quantity; 4] = [
         label: "MiB of the hierarchy in memory",
         logarithmic: false,
         median_window: 0,
+        leaves_out_first: false,
         value: |report| report.pages.resident_bytes as f64 / f64::from(1 << 20),
     },
 ];
@@ -80,8 +89,12 @@ pub(super) fn panel(
     runs: &[&Run],
     name: impl Fn(&Run) -> (String, usize),
 ) -> Result<String, PlotError> {
+    let value = |(at, row): (usize, &Row)| match at {
+        0 if quantity.leaves_out_first => f64::NAN,
+        _ => (quantity.value)(&row.report),
+    };
     let values: Vec<Vec<f64>> =
-        runs.iter().map(|run| run.rows.iter().map(|row| (quantity.value)(&row.report)).collect()).collect();
+        runs.iter().map(|run| run.rows.iter().enumerate().map(value).collect()).collect();
     let names: Vec<(String, usize)> = runs.iter().map(|run| name(run)).collect();
     let series: Vec<Series> = names
         .iter()
