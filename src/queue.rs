@@ -21,18 +21,19 @@
 //! Events of the tick that a clock is in come up at every advance until that tick has passed: their deadline may
 //! lie anywhere in it.
 
+mod pool;
+mod wheel;
+
 use vertex_tree::{Bounds, prefetch};
+
+use self::pool::{Bucket, CHUNK, Pool};
+use self::wheel::{LEVELS, SLOTS, Wheel};
 
 use crate::front::Slot;
 
 /// Ticks in a frame of a clock. A camera far slower than its course still has ticks that are finer than its frames.
 pub const TICKS_PER_FRAME: f64 = 512.0;
 
-/// Slots a level. Deadlines go to the level on which they are at least half of this away.
-const SLOTS: u64 = 16;
-/// Level 28 reaches 2^32 ticks ahead, which is further than any deadline: those are `u32` ticks ahead, and what is
-/// further is scheduled again.
-const LEVELS: usize = 29;
 /// The furthest that an event is scheduled ahead, in ticks: 4 million frames.
 pub const HORIZON: u32 = 1 << 31;
 
@@ -87,186 +88,8 @@ impl Event {
     }
 }
 
-/// Events in a chunk.
-const CHUNK: u32 = 16;
-
-/// A list of chunks of events, of which all but the newest are full: the place after its last event, counted through
-/// all chunks of the pool; 0 while it is empty.
-///
-/// To append is one store where the event goes and one here, in an array that is small enough to stay near. A count in
-/// the chunk itself would be a read that misses the cache, for every event.
-type Bucket = u32;
-
-/// Where all buckets keep their events. Chunks are used again last in, first out: what is written next was read just
-/// before and is in the nearest cache, and once there are enough of them nothing is allocated any more.
-#[derive(Debug)]
-struct Pool {
-    /// The first one is not used, as place 0 says that a bucket is empty.
-    chunks: Vec<[Event; CHUNK as usize]>,
-    /// For each chunk, the one before it in its bucket, or 0.
-    previous: Vec<u32>,
-    free: Vec<u32>,
-}
-
-impl Pool {
-    fn new() -> Self {
-        Self { chunks: vec![[Event::BLANK; CHUNK as usize]], previous: vec![0], free: Vec::new() }
-    }
-
-    #[inline(always)]
-    fn push(&mut self, bucket: &mut Bucket, event: Event) {
-        if bucket.is_multiple_of(CHUNK) {
-            self.open(bucket);
-        }
-        let (chunk, place) = ((*bucket / CHUNK) as usize, (*bucket % CHUNK) as usize);
-        self.chunks[chunk][place] = event;
-        *bucket += 1;
-        // Where the bucket's next event but one goes: stores leave the processor in order, and one that misses the
-        // nearest cache holds up all others.
-        prefetch(self.chunks.as_flattened(), *bucket as usize + 1);
-    }
-
-    /// Adds an empty chunk to a bucket.
-    #[inline(never)]
-    fn open(&mut self, bucket: &mut Bucket) {
-        let previous = bucket.saturating_sub(1) / CHUNK;
-        let chunk = self.free.pop().unwrap_or_else(|| {
-            self.chunks.push([Event::BLANK; CHUNK as usize]);
-            self.previous.push(0);
-            self.chunks.len() as u32 - 1
-        });
-        if let Some(&next) = self.free.last() {
-            prefetch(&self.chunks, next as usize);
-        }
-        self.previous[chunk as usize] = previous;
-        *bucket = chunk * CHUNK;
-    }
-
-    /// Takes events off the end of a bucket that is not empty, no more than there is room for in `due` after the first
-    /// `count`, and none but those that `keep` says to keep. Returns how many there are in `due` then, and how many
-    /// were taken off.
-    #[inline(always)]
-    fn take(
-        &mut self,
-        bucket: &mut Bucket,
-        due: &mut [Event; DUE],
-        mut count: usize,
-        keep: impl Fn(&Event) -> bool,
-    ) -> (usize, usize) {
-        let chunk = (*bucket - 1) / CHUNK;
-        let start = chunk * CHUNK;
-        let used = (*bucket - start) as usize;
-        let taken = used.min(DUE - count);
-        for event in &self.chunks[chunk as usize][used - taken..used] {
-            due[count % DUE] = *event;
-            count += usize::from(keep(event));
-        }
-        *bucket -= taken as u32;
-        if *bucket == start {
-            self.free.push(chunk);
-            let previous = self.previous[chunk as usize];
-            *bucket = if previous == 0 { 0 } else { (previous + 1) * CHUNK };
-            if previous != 0 {
-                self.prefetch_chunk(previous);
-            }
-        }
-        (count, taken)
-    }
-
-    #[inline(always)]
-    fn prefetch_chunk(&self, chunk: u32) {
-        for event in (0..CHUNK).step_by(2) {
-            prefetch(self.chunks.as_flattened(), (chunk * CHUNK + event) as usize);
-        }
-    }
-}
-
 /// Most events that come up at a time: as many as vector code tests together.
 pub const DUE: usize = crate::packed::LANES;
-
-/// Buckets of events on one clock.
-#[derive(Debug)]
-struct Wheel {
-    /// `levels[l][s]` has the events whose deadline tick, divided by `2^l`, is `s` modulo 16.
-    levels: [[Bucket; SLOTS as usize]; LEVELS],
-    /// For each level, a bit for each slot that may hold events.
-    occupied: [u16; LEVELS],
-    /// The tick that the clock is in.
-    tick: u64,
-}
-
-impl Wheel {
-    fn new() -> Self {
-        Self { levels: [[0; SLOTS as usize]; LEVELS], occupied: [0; LEVELS], tick: 0 }
-    }
-
-    /// Puts an event where it comes up before the clock is more than `ahead` ticks further.
-    #[inline(always)]
-    fn push(&mut self, pool: &mut Pool, ahead: u32, event: Event) {
-        let ahead = ahead.min(HORIZON);
-        let deadline = self.tick + u64::from(ahead);
-        // On level l, `ahead` spans (ahead >> l) slots, and one more where it straddles their borders: at most 15.
-        let level = (32 - ahead.leading_zeros()).saturating_sub(4);
-        let straddles = (deadline >> level) - (self.tick >> level) >= SLOTS;
-        let level = level + u32::from(straddles);
-        let slot = (deadline >> level) as u32 % SLOTS as u32;
-        // Never more than there are, which spares a panic.
-        let level = level as usize % LEVELS;
-        self.occupied[level] |= 1 << slot;
-        pool.push(&mut self.levels[level][slot as usize], event);
-    }
-
-    /// Moves each bucket that the clock reaches on its way to `now` to `ripe`.
-    fn advance(&mut self, now: f64, ripe: &mut Vec<Bucket>) {
-        let before = self.tick;
-        let after = (now * TICKS_PER_FRAME) as u64;
-        debug_assert!(after >= before, "the clock went back from tick {before} to {after}");
-        self.tick = after;
-        for level in 0..LEVELS {
-            let (first, last) = (before >> level, after >> level);
-            // The slot of the present tick is drained every time, that of a wider level once, when it is reached.
-            let first = if level == 0 { first } else { first + 1 };
-            if first > last {
-                // Wider levels have not moved either.
-                break;
-            }
-            // The slots from `first` to `last`, round the ring.
-            let count = (last - first + 1).min(SLOTS);
-            let reached = (((1_u32 << count) - 1) as u16).rotate_left((first % SLOTS) as u32);
-            self.take(level, reached, ripe);
-        }
-    }
-
-    fn take_all(&mut self, ripe: &mut Vec<Bucket>) {
-        for level in 0..LEVELS {
-            self.take(level, u16::MAX, ripe);
-        }
-    }
-
-    /// The buckets that an advance to `now` would reach.
-    fn due_within(&self, now: f64) -> impl Iterator<Item = Bucket> + '_ {
-        let last = (now * TICKS_PER_FRAME) as u64;
-        self.levels.iter().zip(0..).flat_map(move |(slots, level)| {
-            // The present slot of a wider level has been drained.
-            let (first, last) = ((self.tick >> level) + u64::from(level > 0), last >> level);
-            (first..=last.min(first + SLOTS - 1)).map(move |slot| slots[(slot % SLOTS) as usize])
-        })
-    }
-
-    /// Moves the buckets in some slots of a level, one bit each.
-    fn take(&mut self, level: usize, slots: u16, ripe: &mut Vec<Bucket>) {
-        let mut slots = slots & self.occupied[level];
-        self.occupied[level] &= !slots;
-        while slots != 0 {
-            let bucket = std::mem::take(&mut self.levels[level][slots.trailing_zeros() as usize]);
-            // Nothing may be left in it but its bit.
-            if bucket != 0 {
-                ripe.push(bucket);
-            }
-            slots &= slots - 1;
-        }
-    }
-}
 
 /// One clock of a queue.
 pub(crate) struct OnClock<'a> {
@@ -477,17 +300,12 @@ impl EventQueue {
         self.read(self.pressing, &mut f);
     }
 
-    fn read(&self, mut bucket: Bucket, f: &mut impl FnMut(&Event)) {
-        while bucket != 0 {
-            let chunk = (bucket - 1) / CHUNK;
-            let used = (bucket - chunk * CHUNK) as usize;
-            self.pool.chunks[chunk as usize][..used]
-                .iter()
-                .filter(|event| self.is_valid(event))
-                .for_each(&mut *f);
-            let previous = self.pool.previous[chunk as usize];
-            bucket = if previous == 0 { 0 } else { (previous + 1) * CHUNK };
-        }
+    fn read(&self, bucket: Bucket, f: &mut impl FnMut(&Event)) {
+        self.pool.read(bucket, |event| {
+            if self.is_valid(event) {
+                f(event);
+            }
+        });
     }
 
     /// Lets every event on one clock come up: for a motion that its speeds do not cover.

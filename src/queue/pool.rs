@@ -1,0 +1,110 @@
+//! Where all buckets keep their events.
+
+use vertex_tree::prefetch;
+
+use super::{DUE, Event};
+
+/// Events in a chunk.
+pub(super) const CHUNK: u32 = 16;
+
+/// A list of chunks of events, of which all but the newest are full: the place after its last event, counted through
+/// all chunks of the pool; 0 while it is empty.
+///
+/// To append is one store where the event goes and one here, in an array that is small enough to stay near. A count in
+/// the chunk itself would be a read that misses the cache, for every event.
+pub(super) type Bucket = u32;
+
+/// Where all buckets keep their events. Chunks are used again last in, first out: what is written next was read just
+/// before and is in the nearest cache, and once there are enough of them nothing is allocated any more.
+#[derive(Debug)]
+pub(super) struct Pool {
+    /// The first one is not used, as place 0 says that a bucket is empty.
+    chunks: Vec<[Event; CHUNK as usize]>,
+    /// For each chunk, the one before it in its bucket, or 0.
+    previous: Vec<u32>,
+    free: Vec<u32>,
+}
+
+impl Pool {
+    pub fn new() -> Self {
+        Self { chunks: vec![[Event::BLANK; CHUNK as usize]], previous: vec![0], free: Vec::new() }
+    }
+
+    #[inline(always)]
+    pub fn push(&mut self, bucket: &mut Bucket, event: Event) {
+        if bucket.is_multiple_of(CHUNK) {
+            self.open(bucket);
+        }
+        let (chunk, place) = ((*bucket / CHUNK) as usize, (*bucket % CHUNK) as usize);
+        self.chunks[chunk][place] = event;
+        *bucket += 1;
+        // Where the bucket's next event but one goes: stores leave the processor in order, and one that misses the
+        // nearest cache holds up all others.
+        prefetch(self.chunks.as_flattened(), *bucket as usize + 1);
+    }
+
+    /// Adds an empty chunk to a bucket.
+    #[inline(never)]
+    pub fn open(&mut self, bucket: &mut Bucket) {
+        let previous = bucket.saturating_sub(1) / CHUNK;
+        let chunk = self.free.pop().unwrap_or_else(|| {
+            self.chunks.push([Event::BLANK; CHUNK as usize]);
+            self.previous.push(0);
+            self.chunks.len() as u32 - 1
+        });
+        if let Some(&next) = self.free.last() {
+            prefetch(&self.chunks, next as usize);
+        }
+        self.previous[chunk as usize] = previous;
+        *bucket = chunk * CHUNK;
+    }
+
+    /// Takes events off the end of a bucket that is not empty, no more than there is room for in `due` after the first
+    /// `count`, and none but those that `keep` says to keep. Returns how many there are in `due` then, and how many
+    /// were taken off.
+    #[inline(always)]
+    pub fn take(
+        &mut self,
+        bucket: &mut Bucket,
+        due: &mut [Event; DUE],
+        mut count: usize,
+        keep: impl Fn(&Event) -> bool,
+    ) -> (usize, usize) {
+        let chunk = (*bucket - 1) / CHUNK;
+        let start = chunk * CHUNK;
+        let used = (*bucket - start) as usize;
+        let taken = used.min(DUE - count);
+        for event in &self.chunks[chunk as usize][used - taken..used] {
+            due[count % DUE] = *event;
+            count += usize::from(keep(event));
+        }
+        *bucket -= taken as u32;
+        if *bucket == start {
+            self.free.push(chunk);
+            let previous = self.previous[chunk as usize];
+            *bucket = if previous == 0 { 0 } else { (previous + 1) * CHUNK };
+            if previous != 0 {
+                self.prefetch_chunk(previous);
+            }
+        }
+        (count, taken)
+    }
+
+    #[inline(always)]
+    pub fn prefetch_chunk(&self, chunk: u32) {
+        for event in (0..CHUNK).step_by(2) {
+            prefetch(self.chunks.as_flattened(), (chunk * CHUNK + event) as usize);
+        }
+    }
+
+    /// Calls `f` with every event in a bucket, the newest chunk first.
+    pub fn read(&self, mut bucket: Bucket, mut f: impl FnMut(&Event)) {
+        while bucket != 0 {
+            let chunk = (bucket - 1) / CHUNK;
+            let used = (bucket - chunk * CHUNK) as usize;
+            self.chunks[chunk as usize][..used].iter().for_each(&mut f);
+            let previous = self.previous[chunk as usize];
+            bucket = if previous == 0 { 0 } else { (previous + 1) * CHUNK };
+        }
+    }
+}

@@ -1,0 +1,94 @@
+//! Buckets by deadline, on one clock.
+
+use super::pool::{Bucket, Pool};
+use super::{Event, HORIZON, TICKS_PER_FRAME};
+
+/// Slots a level. Deadlines go to the level on which they are at least half of this away.
+pub(super) const SLOTS: u64 = 16;
+/// Level 28 reaches 2^32 ticks ahead, which is further than any deadline: those are `u32` ticks ahead, and what is
+/// further is scheduled again.
+pub(super) const LEVELS: usize = 29;
+
+/// Buckets of events on one clock.
+#[derive(Debug)]
+pub(super) struct Wheel {
+    /// `levels[l][s]` has the events whose deadline tick, divided by `2^l`, is `s` modulo 16.
+    pub levels: [[Bucket; SLOTS as usize]; LEVELS],
+    /// For each level, a bit for each slot that may hold events.
+    pub occupied: [u16; LEVELS],
+    /// The tick that the clock is in.
+    tick: u64,
+}
+
+impl Wheel {
+    pub fn new() -> Self {
+        Self { levels: [[0; SLOTS as usize]; LEVELS], occupied: [0; LEVELS], tick: 0 }
+    }
+
+    /// Puts an event where it comes up before the clock is more than `ahead` ticks further.
+    #[inline(always)]
+    pub fn push(&mut self, pool: &mut Pool, ahead: u32, event: Event) {
+        let ahead = ahead.min(HORIZON);
+        let deadline = self.tick + u64::from(ahead);
+        // On level l, `ahead` spans (ahead >> l) slots, and one more where it straddles their borders: at most 15.
+        let level = (32 - ahead.leading_zeros()).saturating_sub(4);
+        let straddles = (deadline >> level) - (self.tick >> level) >= SLOTS;
+        let level = level + u32::from(straddles);
+        let slot = (deadline >> level) as u32 % SLOTS as u32;
+        // Never more than there are, which spares a panic.
+        let level = level as usize % LEVELS;
+        self.occupied[level] |= 1 << slot;
+        pool.push(&mut self.levels[level][slot as usize], event);
+    }
+
+    /// Moves each bucket that the clock reaches on its way to `now` to `ripe`.
+    pub fn advance(&mut self, now: f64, ripe: &mut Vec<Bucket>) {
+        let before = self.tick;
+        let after = (now * TICKS_PER_FRAME) as u64;
+        debug_assert!(after >= before, "the clock went back from tick {before} to {after}");
+        self.tick = after;
+        for level in 0..LEVELS {
+            let (first, last) = (before >> level, after >> level);
+            // The slot of the present tick is drained every time, that of a wider level once, when it is reached.
+            let first = if level == 0 { first } else { first + 1 };
+            if first > last {
+                // Wider levels have not moved either.
+                break;
+            }
+            // The slots from `first` to `last`, round the ring.
+            let count = (last - first + 1).min(SLOTS);
+            let reached = (((1_u32 << count) - 1) as u16).rotate_left((first % SLOTS) as u32);
+            self.take(level, reached, ripe);
+        }
+    }
+
+    pub fn take_all(&mut self, ripe: &mut Vec<Bucket>) {
+        for level in 0..LEVELS {
+            self.take(level, u16::MAX, ripe);
+        }
+    }
+
+    /// The buckets that an advance to `now` would reach.
+    pub fn due_within(&self, now: f64) -> impl Iterator<Item = Bucket> + '_ {
+        let last = (now * TICKS_PER_FRAME) as u64;
+        self.levels.iter().zip(0..).flat_map(move |(slots, level)| {
+            // The present slot of a wider level has been drained.
+            let (first, last) = ((self.tick >> level) + u64::from(level > 0), last >> level);
+            (first..=last.min(first + SLOTS - 1)).map(move |slot| slots[(slot % SLOTS) as usize])
+        })
+    }
+
+    /// Moves the buckets in some slots of a level, one bit each.
+    pub fn take(&mut self, level: usize, slots: u16, ripe: &mut Vec<Bucket>) {
+        let mut slots = slots & self.occupied[level];
+        self.occupied[level] &= !slots;
+        while slots != 0 {
+            let bucket = std::mem::take(&mut self.levels[level][slots.trailing_zeros() as usize]);
+            // Nothing may be left in it but its bit.
+            if bucket != 0 {
+                ripe.push(bucket);
+            }
+            slots &= slots - 1;
+        }
+    }
+}
