@@ -12,6 +12,7 @@
 
 pub mod csv;
 mod replay;
+mod scene;
 
 use std::ops::Range;
 use std::sync::Arc;
@@ -25,12 +26,14 @@ use vertex_tree::simulated::Simulated;
 use vertex_tree::{CollapseLog, LogError, Mesh, NullSink, Prefetch, TreeError, VertexTree};
 
 use self::replay::Replay;
+pub use self::scene::replay_scene;
 use crate::active_mesh::ActiveMesh;
 use crate::brute_force::{BruteForce, unfold_all};
 use crate::budget::{Budget, WorkCap};
 use crate::criterion::Criterion;
 use crate::engine::{Engine, FrameReport, Settings};
 use crate::motion::Speed;
+use crate::objects::StoredSceneError;
 use crate::oracle::{Difference, Oracle};
 use crate::path::Path;
 use crate::progress::Progress;
@@ -205,6 +208,26 @@ pub enum CompareError {
         scene: String,
         /// Why.
         source: TreeError,
+    },
+    /// A scene of several objects can not be opened, or one of its trees can not go on.
+    #[error("{scene}: {source}")]
+    Objects {
+        /// The scene.
+        scene: String,
+        /// Why.
+        source: StoredSceneError,
+    },
+    /// Two strategies have different cuts of a scene of several objects.
+    #[error("{scene}, path {path}, frame {frame}: {} and {} have different cuts", strategies[0], strategies[1])]
+    Disagree {
+        /// The scene.
+        scene: String,
+        /// The path.
+        path: String,
+        /// Number of the frame in the path.
+        frame: usize,
+        /// The strategies.
+        strategies: [&'static str; 2],
     },
     /// A strategy's cut is not the oracle's.
     #[error("{0}")]

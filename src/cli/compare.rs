@@ -1,5 +1,6 @@
 //! `compare`: the main job.
 
+use std::ops::Range;
 use std::path::Path as FilePath;
 
 use anyhow::{Context, Result, bail};
@@ -10,13 +11,14 @@ use super::input::{Input, Replayable};
 use super::print;
 use super::progress::stage;
 use crate::budget::Budget;
-use crate::compare::{Options, Paging, Run, Subject, csv};
+use crate::compare::{Options, Paging, Run, Subject, csv, replay_scene};
+use crate::objects::StoredScene;
 use crate::path::{self, Path};
 use crate::refine::Strategy;
 use crate::render::{self, Image, Style};
 use crate::report::{Picture, Report, Section};
 use crate::scene::{Scene, SceneKind};
-use crate::store::BuildOptions;
+use crate::store::{Backend, BuildOptions};
 use crate::{output, simplify};
 
 pub(super) fn compare(command: &Compare) -> Result<()> {
@@ -34,6 +36,10 @@ pub(super) fn compare(command: &Compare) -> Result<()> {
     let made_by = format!("foldfront {}", arguments.join(" "));
     let mut report = Report { command: made_by, pace: options.pace, sections: Vec::new() };
     for (input, name) in inputs.iter().zip(unique_names(&inputs)) {
+        if let Input::Objects(file) = input {
+            report.sections.push(objects(command, file, &name, &paths, &options)?);
+            continue;
+        }
         let subjects = input.replayable(&name, &command.backend, &BuildOptions::from(&command.storage))?;
         let walks = walks(input, &subjects, &paths)?;
         let is_alone = subjects.len() == 1;
@@ -88,11 +94,7 @@ fn section(
     let mut runs = Vec::new();
     let mut pictures = Vec::new();
     for walk in walks {
-        let frames = command.frames.clone().unwrap_or(0..usize::MAX);
-        let frames = frames.start..frames.end.min(walk.frames.len());
-        if frames.is_empty() {
-            bail!("path {} has frames 0 to {} only", walk.name, walk.frames.len() - 1);
-        }
+        let frames = frames_of(command, walk)?;
         let label = format!("{name}: {}, {} frames", walk.name, frames.len());
         let replayed = stage(&label, |p| subject.replay(walk, frames, options, p))?;
         // One backend shows what the others do.
@@ -116,6 +118,54 @@ fn section(
         runs,
         pictures,
     })
+}
+
+/// Everything about a scene of several objects.
+fn objects(
+    command: &Compare,
+    file: &FilePath,
+    name: &str,
+    walks: &[Path],
+    options: &Options,
+) -> Result<Section> {
+    let backend = Backend::MtPartition;
+    if let Some(other) = command.backend.iter().find(|&&other| other != backend) {
+        bail!(
+            "{}: scenes of several objects are for {}, not for {}",
+            file.display(),
+            backend.name(),
+            other.name()
+        );
+    }
+    if command.wall_clock {
+        bail!("{}: scenes of several objects are not replayed by the wall clock", file.display());
+    }
+    if walks.is_empty() {
+        bail!("{}: a scene of several objects needs a --path", file.display());
+    }
+    let scene = StoredScene::open(file)?;
+    let mut section = Section::new(name, backend, Vec::new());
+    for walk in walks {
+        let frames = frames_of(command, walk)?;
+        let label = format!("{name}: {}, {} frames", walk.name, frames.len());
+        section.runs.extend(stage(&label, |p| replay_scene(name, &scene, walk, frames, options, p))?);
+    }
+    section.facts = vec![
+        ("objects", scene.objects().len().to_string()),
+        ("files", scene.files().len().to_string()),
+        ("least memory", format!("{} bytes", scene.least_memory())),
+    ];
+    Ok(section)
+}
+
+/// The frames of a path that were asked for.
+fn frames_of(command: &Compare, walk: &Path) -> Result<Range<usize>> {
+    let frames = command.frames.clone().unwrap_or(0..usize::MAX);
+    let frames = frames.start..frames.end.min(walk.frames.len());
+    if frames.is_empty() {
+        bail!("path {} has frames 0 to {} only", walk.name, walk.frames.len() - 1);
+    }
+    Ok(frames)
 }
 
 /// The frame with the most active nodes: the one that shows most.

@@ -29,7 +29,7 @@ pub(super) fn build(command: &Build) -> Result<()> {
                 write_within(&input.name(), &log, command, &limits)
             }
             Input::Scene(scene) => anyhow::bail!("--memory builds from files, and {scene} is made in memory"),
-            Input::Stored(_) => input.log(false).map(|_| ()),
+            Input::Stored(_) | Input::Objects(_) => input.log(false).map(|_| ()),
         };
     }
     let (log, report) = input.log(command.merge_components)?;

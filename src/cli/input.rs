@@ -23,6 +23,8 @@ pub(super) enum Input {
     Log(PathBuf),
     /// The file of a backend that pages.
     Stored(PathBuf),
+    /// Several objects: a scene file.
+    Objects(PathBuf),
     /// A mesh, or the tiles of a mosaic.
     Meshes(Vec<PathBuf>),
 }
@@ -38,6 +40,10 @@ impl Input {
                 continue;
             }
             let path = PathBuf::from(argument);
+            if path.extension().is_some_and(|e| e.eq_ignore_ascii_case("scene")) {
+                inputs.push(Self::Objects(path));
+                continue;
+            }
             match backend_of(&path)? {
                 Some(Backend::InMemory) => {
                     inputs.push(Self::Log(path));
@@ -76,7 +82,7 @@ impl Input {
             |path: &Path| path.file_stem().map_or_else(String::new, |s| s.to_string_lossy().into_owned());
         match self {
             Self::Scene(scene) => scene.to_string().trim_start_matches("scene:").to_owned(),
-            Self::Log(path) | Self::Stored(path) => stem(path),
+            Self::Log(path) | Self::Stored(path) | Self::Objects(path) => stem(path),
             Self::Meshes(paths) if paths.len() == 1 => stem(&paths[0]),
             Self::Meshes(paths) => format!("{}+{}", stem(&paths[0]), paths.len() - 1),
         }
@@ -91,6 +97,9 @@ impl Input {
             Self::Stored(path) => {
                 let subject = Subject::of_store(&name, Store::open(path)?);
                 Ok(stage(&format!("{name}: reading"), |_| subject.finest())?)
+            }
+            Self::Objects(path) => {
+                bail!("{}: a scene of several objects is for compare only", path.display())
             }
             Self::Meshes(paths) => Ok(stage(&format!("{name}: reading"), |p| mesh_io::read(paths, p))?),
         }

@@ -187,3 +187,40 @@ fn real_time_is_repeatable_and_checked() {
     place.fail("compare grid.ply --fps 60 --wall-clock --store-latency 5ms", 2, &["--wall-clock"]);
     place.fail("compare grid.ply --prefetch oracle", 2, &["paper, schedule, none"]);
 }
+
+/// A hundred objects side by side, in too little memory for all of them.
+#[test]
+fn a_scene_of_many_objects_is_compared() {
+    let place = Workplace::new();
+    place.succeed("build grid.ply --backend mt-partition --patch 4 --partition 4 -o grid.mt");
+    let object = |i: u32| format!("grid.mt 1 0 0 {} 0 1 0 {} 0 0 1 0\n", 2 * (i % 10), 2 * (i / 10));
+    place.write("many.scene", (0..100).map(object).collect::<String>());
+    let command = "compare many.scene --path descent.path --strategy top-down,front,event --check";
+    place.succeed(&format!("{command} --out results"));
+    assert!(place.text("results/report.html").contains("least memory"));
+    let hashes = hashes_of_strategies(&place.text("results/frames.csv"));
+    assert_eq!(hashes.len(), 3);
+    assert!(hashes.values().all(|cuts| cuts == &hashes["event"] && cuts.len() == 3), "{hashes:?}");
+    let real_time = format!("{command} --prefetch schedule,none --fps 60 --out real");
+    place.succeed(&real_time);
+    let lines = place.text("real/frames.csv").lines().count();
+    assert_eq!(lines, 1 + 3 * 3 * 2, "frames, strategies, ways to prefetch");
+
+    place.fail("compare many.scene", 1, &["many.scene", "--path"]);
+    place.fail(
+        "compare many.scene --path descent.path --backend meta-node",
+        1,
+        &["many.scene", "mt-partition"],
+    );
+    place.fail("build many.scene -o new", 1, &["many.scene", "several objects"]);
+    place.write("broken.scene", "grid.mt 1 0 0\n");
+    place.fail("compare broken.scene --path descent.path", 1, &["broken.scene", "1"]);
+}
+
+fn hashes_of_strategies(frames: &str) -> BTreeMap<String, Vec<String>> {
+    let mut hashes: BTreeMap<String, Vec<String>> = BTreeMap::new();
+    for cells in frames.lines().skip(1).map(|line| line.split(',').collect::<Vec<_>>()) {
+        hashes.entry(cells[3].to_owned()).or_default().push(cells[22].to_owned());
+    }
+    hashes
+}
