@@ -93,7 +93,7 @@ impl Placed {
 }
 
 /// So many frames of a long walk are for all backends, the others for the first alone: what is long is for the engine.
-const ALL_BACKENDS: usize = 10_000;
+const ALL_BACKENDS: usize = 4_000;
 
 /// Slow and fast, rests and teleports.
 fn random_walk(criterion: Criterion, k: f64, seed: u64, frames: usize) {
