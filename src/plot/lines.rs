@@ -13,7 +13,7 @@ pub struct Line<'a> {
     pub name: &'a str,
     /// From left to right.
     pub points: Vec<(f64, f64)>,
-    /// See [`Series::colour`].
+    /// See [`Series::colour`](crate::plot::Series::colour).
     pub colour: usize,
 }
 
@@ -21,7 +21,7 @@ pub struct Line<'a> {
 /// median. Points that are not positive are left out.
 ///
 /// # Errors
-/// As [`curves`].
+/// As [`curves`](crate::plot::curves).
 pub fn lines(plot: &Plot, lines: &[Line]) -> Result<String, PlotError> {
     let names: Vec<(&str, usize)> = lines.iter().map(|line| (line.name, line.colour)).collect();
     picture(plot, &names, |canvas, top, bottom| {

@@ -33,9 +33,6 @@ impl Window {
                 changed[block as usize] = true;
             }
         }
-        // Another thread may have far blocks in its window.
-        let near = self.blocks.iter().map(|&(_, ring)| ring >= Ring::Near);
-        debug_assert!(changed.iter().zip(near).all(|(&changed, near)| near || !changed));
         self.find_neighbours(blocks, &block_of, &changed);
         // Triangles by the block of their lowest corner.
         let surface = &self.builder.surface;

@@ -172,21 +172,15 @@ impl Window {
         self.builder.surface.merged_into.len()
     }
 
-    /// Takes the keys of all vertices that may change out of the counts, or puts them back in. Far blocks do not change,
-    /// and may be in another thread's window too.
+    /// Takes the keys of all vertices out of the counts, or puts them back in.
     pub fn count(&self, counts: &mut KeyCounts, back: bool) {
         let (surface, candidates) = (&self.builder.surface, &self.builder.candidates);
-        for ((_, ring), ends) in self.blocks.iter().zip(self.starts.windows(2)) {
-            if *ring < Ring::Near {
-                continue;
-            }
-            for v in ends[0] as usize..ends[1] as usize {
-                if surface.merged_into[v] == NONE && candidates.state[v] != State::Nothing {
-                    if back {
-                        counts.add(candidates.key[v]);
-                    } else {
-                        counts.remove(candidates.key[v]);
-                    }
+        for v in 0..self.originals.len() {
+            if surface.merged_into[v] == NONE && candidates.state[v] != State::Nothing {
+                if back {
+                    counts.add(candidates.key[v]);
+                } else {
+                    counts.remove(candidates.key[v]);
                 }
             }
         }
