@@ -133,6 +133,21 @@ impl Default for Options {
     }
 }
 
+impl Options {
+    /// How an engine refines along a path of this declared speed.
+    fn settings(&self, strategy: Strategy, speed: &Speed) -> Settings {
+        Settings {
+            strategy,
+            criterion: self.criterion,
+            normal_cone: self.normal_cone,
+            rho: speed.rho,
+            omega: speed.omega,
+            budget: self.budget,
+            work_cap: self.work_cap,
+        }
+    }
+}
+
 /// One frame of a replay.
 #[derive(Clone, Copy, Debug)]
 pub struct Row {
@@ -526,15 +541,7 @@ impl Subject {
         for &prefetch in prefetch {
             let opening = Opening { paging: options.paging, prefetch, pace: options.pace };
             for &strategy in &options.strategies {
-                let settings = Settings {
-                    strategy,
-                    criterion: options.criterion,
-                    normal_cone: options.normal_cone,
-                    rho: speed.rho,
-                    omega: speed.omega,
-                    budget: options.budget,
-                    work_cap: options.work_cap,
-                };
+                let settings = options.settings(strategy, &speed);
                 let frames = frames.clone();
                 let replay = Replay { subject: self, path, frames, views: &views, settings, opening };
                 let rows = with_trees!(self, |open| {

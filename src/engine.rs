@@ -127,6 +127,32 @@ pub struct FrameReport {
     pub pages: PageStats,
 }
 
+impl FrameReport {
+    /// Two advances to the same views as one frame: what both did and cost, and how it ended.
+    #[must_use]
+    pub fn followed_by(&self, later: &Self) -> Self {
+        let (a, b) = (self, later);
+        Self {
+            select: a.select + b.select,
+            apply: a.apply + b.apply,
+            tests: a.tests + b.tests,
+            unfolds: a.unfolds + b.unfolds,
+            folds: a.folds + b.folds,
+            forced: a.forced + b.forced,
+            pages: PageStats {
+                reads: a.pages.reads + b.pages.reads,
+                read_bytes: a.pages.read_bytes + b.pages.read_bytes,
+                faults: a.pages.faults + b.pages.faults,
+                ahead: a.pages.ahead + b.pages.ahead,
+                ahead_used: a.pages.ahead_used + b.pages.ahead_used,
+                no_room: a.pages.no_room + b.pages.no_room,
+                resident_bytes: b.pages.resident_bytes,
+            },
+            ..*b
+        }
+    }
+}
+
 /// A front through a hierarchy of backend `T`, reporting the displayed mesh to `M`.
 pub struct Engine<T, M> {
     tree: T,

@@ -4,7 +4,7 @@ use std::ops::Range;
 use std::time::Instant;
 
 use rustc_hash::FxHashSet;
-use vertex_tree::{MeshSink, NodeId, NullSink, PageStats, VertexTree};
+use vertex_tree::{MeshSink, NodeId, NullSink, VertexTree};
 
 use super::{Check, CompareError, Opening, Pace, Row, Subject, WrongCut};
 use crate::active_mesh::ActiveMesh;
@@ -73,16 +73,7 @@ impl Replay<'_> {
             }
             engine.tree_mut().settle().map_err(wrap)?;
             let report = engine.advance(views).map_err(wrap)?;
-            all = FrameReport {
-                select: all.select + report.select,
-                apply: all.apply + report.apply,
-                tests: all.tests + report.tests,
-                unfolds: all.unfolds + report.unfolds,
-                folds: all.folds + report.folds,
-                forced: all.forced + report.forced,
-                pages: sum(&all.pages, &report.pages),
-                ..report
-            };
+            all = all.followed_by(&report);
         }
         Ok(all)
     }
@@ -186,18 +177,5 @@ impl Replay<'_> {
             count();
             Ok(())
         })
-    }
-}
-
-/// What paging did in two frames.
-fn sum(a: &PageStats, b: &PageStats) -> PageStats {
-    PageStats {
-        reads: a.reads + b.reads,
-        read_bytes: a.read_bytes + b.read_bytes,
-        resident_bytes: b.resident_bytes,
-        faults: a.faults + b.faults,
-        ahead: a.ahead + b.ahead,
-        ahead_used: a.ahead_used + b.ahead_used,
-        no_room: b.no_room,
     }
 }

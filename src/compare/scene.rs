@@ -6,7 +6,6 @@
 use std::ops::Range;
 
 use super::{CompareError, Opening, Options, Pace, Row, Run, declared_speed};
-use crate::engine::Settings;
 use crate::objects::StoredScene;
 use crate::path::Path;
 use crate::progress::Progress;
@@ -40,15 +39,7 @@ pub fn replay_scene(
             Pace::Settled | Pace::WallClock(_) => None,
         };
         for &strategy in &options.strategies {
-            let settings = Settings {
-                strategy,
-                criterion: options.criterion,
-                normal_cone: options.normal_cone,
-                rho: speed.rho,
-                omega: speed.omega,
-                budget: options.budget,
-                work_cap: options.work_cap,
-            };
+            let settings = options.settings(strategy, &speed);
             // A memory and a store for each replay.
             let reports =
                 scene.replay(&views, settings, &opening.mt_partition(), frame_time).map_err(wrap)?;

@@ -113,25 +113,33 @@ impl<T: VertexTree, M: MeshSink, F: Watch> Steps<'_, T, M, F> {
     /// Folds, then unfolds, and whatever follows.
     fn apply(&mut self) -> Result<(), TreeError> {
         self.take_turns(Kind::Fold)?;
-        // What a rule forbade when its turn came may have become possible since: to a fixpoint, so that the order in which
-        // a strategy finds changes does not matter.
-        let mut before = None;
-        while !self.blocked.is_empty() && before != Some(self.counts.folds) {
-            before = Some(self.counts.folds);
-            self.folding.clear();
-            self.folding.append(self.blocked);
-            self.take_turns(Kind::Fold)?;
-        }
+        self.retry_blocked(Kind::Fold)?;
         self.forbid();
         self.take_turns(Kind::Unfold)?;
-        let mut before = None;
-        while !self.blocked.is_empty() && before != Some(self.counts.unfolds) {
-            before = Some(self.counts.unfolds);
-            self.unfolding.clear();
-            self.unfolding.append(self.blocked);
-            self.take_turns(Kind::Unfold)?;
-        }
+        self.retry_blocked(Kind::Unfold)?;
         self.let_go()
+    }
+
+    /// What a rule forbade when its turn came may have become possible since: to a fixpoint, so that the order in which a
+    /// strategy finds changes does not matter.
+    fn retry_blocked(&mut self, kind: Kind) -> Result<(), TreeError> {
+        let mut before = None;
+        while !self.blocked.is_empty() && before != Some(self.changes(kind)) {
+            before = Some(self.changes(kind));
+            let list = if kind == Kind::Fold { &mut *self.folding } else { &mut *self.unfolding };
+            list.clear();
+            list.append(self.blocked);
+            self.take_turns(kind)?;
+        }
+        Ok(())
+    }
+
+    /// Changes of a kind made so far in this frame.
+    fn changes(&self, kind: Kind) -> u64 {
+        match kind {
+            Kind::Fold => self.counts.folds,
+            Kind::Unfold => self.counts.unfolds,
+        }
     }
 
     /// What is blocked now stays so in this frame.

@@ -141,30 +141,10 @@ impl StoredScene {
                 }
                 objects.settle()?;
                 let report = objects.advance(views)?;
-                all = followed_by(&all, &report);
+                all = all.followed_by(&report);
             }
             reports.push(all);
         }
         Ok(reports)
     }
-}
-
-/// Two advances of a frame as one.
-fn followed_by(a: &FrameReport, b: &FrameReport) -> FrameReport {
-    let mut all = FrameReport {
-        select: a.select + b.select,
-        apply: a.apply + b.apply,
-        tests: a.tests + b.tests,
-        unfolds: a.unfolds + b.unfolds,
-        folds: a.folds + b.folds,
-        forced: a.forced + b.forced,
-        ..*b
-    };
-    all.pages.reads += a.pages.reads;
-    all.pages.read_bytes += a.pages.read_bytes;
-    all.pages.faults += a.pages.faults;
-    all.pages.ahead += a.pages.ahead;
-    all.pages.ahead_used += a.pages.ahead_used;
-    all.pages.no_room += a.pages.no_room;
-    all
 }
