@@ -64,7 +64,7 @@ pub(super) struct Build {
     /// Memory to build within, such as 256M, for meshes that are larger; the rest is kept in temporary files.
     #[arg(long, value_name = "SIZE", value_parser = size)]
     pub memory: Option<u64>,
-    /// Threads that may share this memory, 1 to 4; at present one works on a pass, whatever this says.
+    /// Threads that share this memory, 1 to 4; the result does not depend on it [default: one a core].
     #[arg(long, value_name = "N", requires = "memory", value_parser = clap::value_parser!(u8).range(1..=4))]
     pub threads: Option<u8>,
     /// Folder for temporary files [default: that of the output].

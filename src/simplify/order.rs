@@ -6,8 +6,9 @@
 //! they can be worked on at the same time, and the result is that of this order all the same.
 //!
 //! Nearness is counted in steps from one piece of a block, of [`SPAN`] numbers at the start, to another that shares a
-//! triangle with it. A vertex that comes up changes what is up to one step away and looks at what is up to two steps
-//! away (see `out_of_core::window`), so three steps apart two vertices may still meet and four steps apart they do not.
+//! triangle with it. A vertex that comes up looks at what is up to two steps away, and mostly changes what is one step away;
+//! but where its star vanishes as a whole, the triangles around the vertex that is kept stand in for it, and their other
+//! corners are two steps away. So four steps apart two vertices may still meet and five steps apart they do not.
 
 /// Numbers of vertices in a piece of a block at the start.
 pub(super) const SPAN: u32 = 256;
@@ -16,7 +17,7 @@ pub(super) const PIECES: u32 = 8;
 /// Parts of the mesh. As many threads find work.
 pub(super) const PARTS: u32 = 4;
 /// Steps within which vertices that come up may meet.
-const STEPS: usize = 3;
+const STEPS: usize = 4;
 /// Pieces of more numbers would make blocks of more than 2^32.
 const MOST_DOUBLINGS: u32 = 21;
 
@@ -59,7 +60,7 @@ mod tests {
         assert_eq!(spans, [1, 1, 1, 2, 2, 4, 1 << MOST_DOUBLINGS]);
     }
 
-    /// A strip of pieces, each beside the next: three of them after the end of a part are near it.
+    /// A strip of pieces, each beside the next: four of them after the end of a part are near it.
     #[test]
     fn borders_are_where_parts_meet() {
         let pieces = 16 * PIECES + 3;

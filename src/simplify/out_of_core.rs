@@ -65,8 +65,8 @@ pub struct Limits<'a> {
     pub memory: u64,
     /// Where temporary files are made.
     pub temporary: PathBuf,
-    /// How many threads may work at the same time, at least 1 and at most [`MOST_THREADS`]. The result does not depend on
-    /// it. At present passes use one alone: where edges are long, windows that should not meet can.
+    /// How many threads may work at the same time, at least 1 and at most [`MOST_THREADS`]. They share the memory. The
+    /// result does not depend on it.
     pub threads: usize,
     /// About how many triangles there will be, to see before they are read whether there is room; 0 where nobody knows.
     pub expected_triangles: u64,
@@ -175,10 +175,10 @@ pub fn build_within(
         whole,
         next_id: 0,
         stop: limits.stop,
-        // Where edges are long, a window can change blocks that were far from it when it was loaded (Den Haag in 4 MB), and
-        // another thread might have those: until that is told beforehand, one thread works on a pass, whatever is allowed.
-        threads: 1,
-        window_bytes: memory - memory / 8,
+        threads: limits.threads.max(1),
+        // The allocator keeps memory back for each thread that has freed it.
+        whole_bytes: memory - memory / 8,
+        window_bytes: if limits.threads > 1 { memory / 8 * 5 } else { memory - memory / 8 },
         sort_bytes: (memory / 32) as usize,
         log: Log::new(&scratch).map_err(temporary)?,
         scratch,

@@ -98,6 +98,17 @@ fn the_result_does_not_depend_on_the_number_of_threads() {
     }
 }
 
+/// Stars that vanish as a whole, and edges that are long for blocks as small as these.
+#[test]
+fn a_town_does_not_depend_on_the_number_of_threads() {
+    let Some(mesh) = data::mesh("city/denhaag01_lod2_terrain.obj") else { return };
+    let in_memory = simplify(&mesh, false);
+    for threads in [1, 4] {
+        let report = assert_same_as(&in_memory, &mesh, false, 4 << 20, threads);
+        assert!(report.windows > 10, "{report:?}");
+    }
+}
+
 #[test]
 fn components_are_merged_as_in_memory_where_there_is_enough() {
     let Some(mesh) = data::mesh("city/denhaag01_lod2_terrain.obj") else { return };
@@ -112,6 +123,7 @@ fn components_are_merged_within_little_memory() {
     let (log, report) = build(&mesh, true, 4 << 20);
     assert!(report.windows > 10 && report.roots < 10, "{report:?}");
     check(&mesh, &log, &report);
+    assert!(build_with(&mesh, true, 4 << 20, 1).0 == log, "another log with one thread");
 }
 
 /// The invariant of a pass: nothing is collapsed beyond its longest spanning edge, and in ascending order.

@@ -2,14 +2,15 @@
 //!
 //! Each thread owns the window that it works on. The blocks on disk, and what is counted over all windows, are behind a
 //! lock each, held while a block is read or written, and while a window's vertices are counted. Which thread comes first
-//! makes no difference: windows that are worked on at the same time are more than two steps apart (see `order`), so none
-//! reads what another writes.
+//! makes no difference: windows that are worked on at the same time have no block in common (see `order`), so none reads what
+//! another writes.
 
 use std::io;
 use std::ops::Range;
 use std::sync::atomic::{AtomicBool, Ordering};
 
 use parking_lot::Mutex;
+use rustc_hash::FxHashSet;
 use vertex_tree::NONE;
 use vertex_tree::external::Sorter;
 
@@ -46,6 +47,8 @@ pub(super) struct Pass<'p> {
     pub stop: &'p AtomicBool,
     pub blocks: Mutex<&'p mut Blocks>,
     pub totals: Mutex<Totals<'p>>,
+    /// Pieces that are in a window now, where assertions are checked.
+    pub in_use: Mutex<FxHashSet<u32>>,
 }
 
 /// What is counted and collected over all windows.
@@ -86,6 +89,11 @@ impl Pass<'_> {
     }
 
     fn window(&self, list: Vec<(u32, Ring)>, next_id: u32) -> io::Result<u32> {
+        let pieces: Vec<u32> =
+            if cfg!(debug_assertions) { list.iter().map(|&(piece, _)| piece).collect() } else { Vec::new() };
+        for &piece in &pieces {
+            assert!(self.in_use.lock().insert(piece), "piece {piece} is in two windows");
+        }
         let mut window = Window::load(&self.blocks, list, self.whole, next_id)?;
         window.count(self.totals.lock().counts, false);
         let roots = self.work_on(&mut window);
@@ -107,6 +115,10 @@ impl Pass<'_> {
         let is_begun = matches!(self.work, Work::Begin);
         let kept = window.store(&self.blocks, |s, v| !is_begun || s.spokes(v).next().is_some())?;
         self.totals.lock().kept += kept;
+        let mut in_use = self.in_use.lock();
+        for piece in pieces {
+            in_use.remove(&piece);
+        }
         Ok(next_id)
     }
 

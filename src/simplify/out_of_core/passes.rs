@@ -26,6 +26,9 @@ pub(super) struct Passes<'a> {
     pub stop: &'a AtomicBool,
     /// Threads that may work on a pass.
     pub threads: usize,
+    /// Bytes of memory that all that is left may take, to be finished in memory: the same for any number of threads, as
+    /// components are joined then.
+    pub whole_bytes: u64,
     /// Bytes of memory that all windows together may take, and those that a pass's nodes may take while they are sorted.
     pub window_bytes: u64,
     pub sort_bytes: usize,
@@ -73,7 +76,7 @@ impl Passes<'_> {
     }
 
     fn fits(&self) -> bool {
-        (0..self.blocks.len() as u32).map(|b| self.blocks.memory(b)).sum::<u64>() <= self.window_bytes
+        (0..self.blocks.len() as u32).map(|b| self.blocks.memory(b)).sum::<u64>() <= self.whole_bytes
     }
 
     /// The rest, once all that is left fits in memory.
@@ -143,6 +146,7 @@ impl Passes<'_> {
             stop: self.stop,
             blocks: Mutex::new(&mut self.blocks),
             totals: Mutex::new(totals),
+            in_use: Mutex::default(),
         };
         let failed = AtomicBool::new(false);
         let mut rings = vec![Ring::Outside; pieces];
