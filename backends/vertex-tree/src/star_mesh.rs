@@ -10,7 +10,7 @@
 //! * the triangles that disappear when a node folds are those with a corner at both of its vertices.
 //!
 //! Vertices and triangles live in slots that are used again, so everything here is as large as the displayed mesh and
-//! not as the hierarchy. A triangle is a quarter of a cache line, the corners at a vertex are another (see [`stars`]).
+//! not as the hierarchy. A triangle is half a cache line, the corners at a vertex are another (see [`stars`]).
 //!
 //! [`stars`]: crate::stars
 
@@ -59,11 +59,13 @@ impl LeafTriangle {
 
 /// A triangle while it is displayed.
 #[derive(Clone, Copy, Debug)]
-#[repr(C, align(16))]
+#[repr(C, align(32))]
 struct Triangle {
+    leaves: [u32; 3],
     vertices: [VertexId; 3],
     /// [`NONE`] in a hole.
     number: u32,
+    _reserved: u32,
 }
 
 /// The displayed triangles, and the star of each displayed vertex.
@@ -155,8 +157,8 @@ impl StarMesh {
 
     #[inline(always)]
     fn show<M: MeshSink>(&mut self, triangle: LeafTriangle, vertices: [VertexId; 3], mesh: &mut M) {
-        let leaves = triangle.leaves;
-        let triangle = Triangle { vertices, number: triangle.number() };
+        let triangle =
+            Triangle { leaves: triangle.leaves, vertices, number: triangle.number(), _reserved: 0 };
         let slot = loop {
             match self.holes.pop() {
                 Some(slot) if (slot as usize) < self.triangles.len() => {
@@ -172,7 +174,7 @@ impl StarMesh {
         };
         self.displayed += 1;
         for (i, vertex) in vertices.into_iter().enumerate() {
-            self.stars.push(vertex, corner(slot, i), leaves[i]);
+            self.stars.push(vertex, corner(slot, i));
         }
         mesh.triangle_added(slot, vertices);
     }
@@ -190,10 +192,15 @@ impl StarMesh {
         let from = self.vertex_of_leaf.get(kept);
         let to = self.add_vertex(removed, position, mesh);
         let triangles = &mut self.triangles;
-        self.stars.split(from, to, removed, |corner| {
+        self.stars.split(from, to, |corner| {
             let (t, i) = triangle_of(corner);
-            triangles[t].vertices[i % 3] = to;
-            mesh.corner_moved(t as u32, i % 3, to);
+            let triangle = &mut triangles[t];
+            let moves = triangle.leaves[i % 3] >= removed;
+            if moves {
+                triangle.vertices[i % 3] = to;
+                mesh.corner_moved(t as u32, i % 3, to);
+            }
+            moves
         });
         for &triangle in brought {
             let far = triangle.far();
@@ -212,7 +219,7 @@ impl StarMesh {
     pub fn merge<M: MeshSink>(&mut self, [kept, removed]: [u32; 2], mesh: &mut M) {
         let to = self.vertex_of_leaf.get(kept);
         let from = self.vertex_of_leaf.get(removed);
-        while let Some((corner, leaf)) = self.stars.pop(from) {
+        while let Some(corner) = self.stars.pop(from) {
             let (t, i) = triangle_of(corner);
             let triangle = &mut self.triangles[t];
             let [a, b, c] = triangle.vertices;
@@ -226,7 +233,7 @@ impl StarMesh {
                 mesh.triangle_removed(t as u32);
             } else {
                 triangle.vertices[i % 3] = to;
-                self.stars.push(to, corner, leaf);
+                self.stars.push(to, corner);
                 mesh.corner_moved(t as u32, i % 3, to);
             }
         }
@@ -260,25 +267,20 @@ impl StarMesh {
         // A vertex that is shown will be merged away, another will come back.
         let (to, from) = (self.vertex_of_leaf.get(kept), self.vertex_of_leaf.get(removed));
         if step == 1 {
-            self.stars.prefetch(to, from == NONE);
-            self.stars.prefetch(from, true);
+            self.stars.prefetch(to);
+            self.stars.prefetch(from);
             if from == NONE {
                 brought.iter().for_each(|triangle| self.shown.prefetch(triangle.far_leaf()));
             }
             return;
         }
-        let prefetch = |corner| {
+        for &corner in self.stars.corners(if from == NONE { to } else { from }) {
             let (t, _) = triangle_of(corner);
             prefetch(&self.triangles, t);
             mesh.prefetch(t as u32);
-        };
-        if from != NONE {
-            self.stars.corners(from).iter().for_each(|&corner| prefetch(corner));
-        } else {
-            self.stars.for_each_moving(to, removed, prefetch);
-            brought
-                .iter()
-                .for_each(|triangle| self.stars.prefetch(self.vertex_at(triangle.far_leaf()), false));
+        }
+        if from == NONE {
+            brought.iter().for_each(|triangle| self.stars.prefetch(self.vertex_at(triangle.far_leaf())));
         }
     }
 
