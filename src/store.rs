@@ -100,6 +100,21 @@ pub enum StoreError {
         /// Of the input.
         triangles: u64,
     },
+    /// There is not as much room for temporary files as will be needed.
+    #[error(
+        "temporary files in {}: about {} MB will be needed for a file of {}, {} MB are free",
+        folder.display(), needed >> 20, backend.name(), free >> 20
+    )]
+    Room {
+        /// The backend.
+        backend: Backend,
+        /// Where they are made.
+        folder: PathBuf,
+        /// Bytes, as estimated.
+        needed: u64,
+        /// Bytes.
+        free: u64,
+    },
     /// A collapse log is damaged.
     #[error(transparent)]
     LogFile(#[from] LogFileError),
@@ -173,16 +188,15 @@ pub struct WriteLimits<'a> {
 }
 
 impl WriteLimits<'_> {
-    /// Fails if a backend's file can not be written for a mesh of so many vertices and triangles: detail blocks and
+    /// Fails if a backend's file can not be written for a mesh of so many vertices and triangles:
     /// multi-triangulations need the log and what they make of it in memory.
     ///
     /// # Errors
     /// [`StoreError::Memory`].
     pub fn check(&self, backend: Backend, vertices: u64, triangles: u64) -> Result<(), StoreError> {
         let [a_vertex, a_triangle] = match backend {
-            Backend::InMemory | Backend::MetaNode => [0, 0],
-            // Log and forest: 56 and 12 bytes. What comes to that is what each crate says of itself.
-            Backend::DetailBlock => [56 + 100, 12 + 60],
+            Backend::InMemory | Backend::MetaNode | Backend::DetailBlock => [0, 0],
+            // Log and forest: 56 and 12 bytes. What comes to that is what the crate says of itself.
             Backend::MtPartition => [56, 12 + 200],
         };
         let needed = vertices * a_vertex + triangles * a_triangle;
@@ -190,6 +204,19 @@ impl WriteLimits<'_> {
             return Err(StoreError::Memory { backend, needed, given: self.memory, triangles });
         }
         Ok(())
+    }
+}
+
+impl WriteLimits<'_> {
+    /// Fails if so many bytes of temporary files will not fit.
+    fn check_room(&self, backend: Backend, needed: u64) -> Result<(), StoreError> {
+        match fs4::available_space(&self.temporary) {
+            Ok(free) if free < needed => {
+                Err(StoreError::Room { backend, folder: self.temporary.clone(), needed, free })
+            }
+            // Where nobody can say, it will be seen.
+            _ => Ok(()),
+        }
     }
 }
 
@@ -218,7 +245,21 @@ pub fn write_within(
                 meta_node::Workspace { folder: limits.temporary.clone(), memory, stop: limits.stop };
             meta_node::write_within(file, log, &options, &workspace)?;
         }
-        Backend::DetailBlock | Backend::MtPartition => {
+        Backend::DetailBlock => {
+            let mut build = detail_block::BuildOptions { quantize: options.quantize, ..Default::default() };
+            build.levels = options.levels.unwrap_or(build.levels);
+            if limits.memory < detail_block::needed_bytes(counts.vertices, counts.triangles) {
+                let needed = detail_block::needed_disk_bytes(counts.vertices, counts.triangles);
+                limits.check_room(backend, needed)?;
+            }
+            let workspace = detail_block::Workspace {
+                folder: limits.temporary.clone(),
+                memory: limits.memory,
+                stop: limits.stop,
+            };
+            detail_block::write_within(file, log, &build, &workspace)?;
+        }
+        Backend::MtPartition => {
             write(backend, file, &read_log(log.path())?, options)?;
         }
     }

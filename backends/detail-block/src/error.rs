@@ -1,6 +1,7 @@
 //! What can be wrong with a file, and with building one.
 
 use std::io;
+use std::path::{Path, PathBuf};
 
 use vertex_tree::LogError;
 
@@ -43,6 +44,23 @@ pub enum XfmError {
         /// Why.
         source: io::Error,
     },
+    /// The log that a file was to be built from can not be read.
+    #[error("reading the collapse log: {source}")]
+    Source {
+        /// Why.
+        source: io::Error,
+    },
+    /// A temporary file can not be written or read.
+    #[error("temporary files in {}: {source}", folder.display())]
+    Temporary {
+        /// Where they are made.
+        folder: PathBuf,
+        /// Why.
+        source: io::Error,
+    },
+    /// Somebody wanted the construction to end.
+    #[error("interrupted")]
+    Interrupted,
     /// Reading failed.
     #[error("{file}: reading {length} bytes at offset {offset}: {source}")]
     Read {
@@ -119,4 +137,46 @@ pub enum XfmError {
         /// What is wrong with it.
         reason: &'static str,
     },
+}
+
+/// What goes wrong in a construction, before it is known what is called how.
+#[derive(Debug)]
+pub(crate) enum Failure {
+    /// With a temporary file.
+    Temporary(io::Error),
+    /// With the log.
+    Source(io::Error),
+    /// With what is written.
+    Output(io::Error),
+    Other(XfmError),
+}
+
+impl From<io::Error> for Failure {
+    fn from(error: io::Error) -> Self {
+        Self::Temporary(error)
+    }
+}
+
+impl From<XfmError> for Failure {
+    fn from(error: XfmError) -> Self {
+        Self::Other(error)
+    }
+}
+
+impl From<LogError> for Failure {
+    fn from(error: LogError) -> Self {
+        Self::Other(error.into())
+    }
+}
+
+impl Failure {
+    /// The error for temporary files in a folder and a file to be written.
+    pub fn into_error(self, folder: &Path, file: &Path) -> XfmError {
+        match self {
+            Self::Temporary(source) => XfmError::Temporary { folder: folder.to_owned(), source },
+            Self::Source(source) => XfmError::Source { source },
+            Self::Output(source) => XfmError::Write { file: file.display().to_string(), source },
+            Self::Other(error) => error,
+        }
+    }
 }

@@ -109,73 +109,22 @@ impl HalfEdges {
         }
     }
 
-    /// w x y z of the collapse of the edge with the half-edges `a` and `d`, one of which may be [`BOUNDARY`].
+    /// See [`adjacent`].
     pub fn adjacent(&self, a: HalfEdge, d: HalfEdge) -> Adjacent {
-        let beside = |h: HalfEdge| match h {
-            BOUNDARY => [BOUNDARY; 2],
-            h => [self.rev(next(h)), self.rev(prev(h))],
-        };
-        let ([w, x], [y, z]) = (beside(a), beside(d));
-        Adjacent { w, x, y, z }
+        let Ok(adjacent) = adjacent(&mut &*self, a, d);
+        adjacent
     }
 
-    /// The half-edges that start at the removed vertex `v`, in triangles that the collapse does not remove: those that
-    /// change their start, whichever way. They lie between `x` and `y`, in two arms if `v` is on a boundary.
-    ///
-    /// Returns `false` if `x` and `y` are not at one vertex, which happens in a damaged file alone. It ends all the same:
-    /// turning about a vertex is a permutation, so it comes back to where it began.
+    /// See [`fan`].
     #[inline]
-    pub fn fan(&self, Adjacent { x, y, .. }: Adjacent, fan: &mut Vec<HalfEdge>) -> bool {
-        fan.clear();
-        let mut h = x;
-        while h != BOUNDARY {
-            fan.push(h);
-            let into = prev(h);
-            if into == y {
-                return true;
-            }
-            h = self.rev(into);
-            if h == x {
-                return false;
-            }
-        }
-        if y != BOUNDARY {
-            let first = next(y);
-            let mut h = first;
-            loop {
-                fan.push(h);
-                match self.rev(h) {
-                    BOUNDARY => break,
-                    back => h = next(back),
-                }
-                if h == first {
-                    return false;
-                }
-            }
-        }
-        true
+    pub fn fan(&self, adjacent: Adjacent, found: &mut Vec<HalfEdge>) -> bool {
+        let Ok(fits) = fan(&mut &*self, adjacent, found);
+        fits
     }
 
-    /// All half-edges that start where `first` does, in any order.
-    pub fn orbit(&self, first: HalfEdge, orbit: &mut Vec<HalfEdge>) {
-        orbit.clear();
-        let mut h = first;
-        loop {
-            orbit.push(h);
-            h = self.rev(prev(h));
-            if h == first {
-                return;
-            }
-            if h == BOUNDARY {
-                break;
-            }
-        }
-        let mut back = self.rev(first);
-        while back != BOUNDARY {
-            let h = next(back);
-            orbit.push(h);
-            back = self.rev(h);
-        }
+    /// See [`orbit`].
+    pub fn orbit(&self, first: HalfEdge, found: &mut Vec<HalfEdge>) {
+        let Ok(()) = orbit(&mut &*self, first, found);
     }
 
     /// The kept vertex and the far corners `p` and `q` of a collapse that has been made, seen from what is around it.
@@ -200,4 +149,101 @@ impl HalfEdges {
             [false, false] => None,
         }
     }
+}
+
+/// What knows the reverses of half-edges.
+pub(crate) trait Reverses {
+    /// Why they may not be had.
+    type Error;
+
+    fn rev(&mut self, h: HalfEdge) -> Result<HalfEdge, Self::Error>;
+}
+
+impl Reverses for &HalfEdges {
+    type Error = std::convert::Infallible;
+
+    #[inline(always)]
+    fn rev(&mut self, h: HalfEdge) -> Result<HalfEdge, Self::Error> {
+        Ok(HalfEdges::rev(self, h))
+    }
+}
+
+/// w x y z of the collapse of the edge with the half-edges `a` and `d`, one of which may be [`BOUNDARY`].
+#[inline]
+pub(crate) fn adjacent<R: Reverses>(edges: &mut R, a: HalfEdge, d: HalfEdge) -> Result<Adjacent, R::Error> {
+    let mut beside = |h: HalfEdge| match h {
+        BOUNDARY => Ok([BOUNDARY; 2]),
+        h => Ok([edges.rev(next(h))?, edges.rev(prev(h))?]),
+    };
+    let ([w, x], [y, z]) = (beside(a)?, beside(d)?);
+    Ok(Adjacent { w, x, y, z })
+}
+
+/// The half-edges that start at the removed vertex `v`, in triangles that the collapse does not remove: those that
+/// change their start, whichever way. They lie between `x` and `y`, in two arms if `v` is on a boundary.
+///
+/// Returns `false` if `x` and `y` are not at one vertex, which happens in a damaged file alone. It ends all the same:
+/// turning about a vertex is a permutation, so it comes back to where it began.
+#[inline]
+pub(crate) fn fan<R: Reverses>(
+    edges: &mut R,
+    Adjacent { x, y, .. }: Adjacent,
+    fan: &mut Vec<HalfEdge>,
+) -> Result<bool, R::Error> {
+    fan.clear();
+    let mut h = x;
+    while h != BOUNDARY {
+        fan.push(h);
+        let into = prev(h);
+        if into == y {
+            return Ok(true);
+        }
+        h = edges.rev(into)?;
+        if h == x {
+            return Ok(false);
+        }
+    }
+    if y != BOUNDARY {
+        let first = next(y);
+        let mut h = first;
+        loop {
+            fan.push(h);
+            match edges.rev(h)? {
+                BOUNDARY => break,
+                back => h = next(back),
+            }
+            if h == first {
+                return Ok(false);
+            }
+        }
+    }
+    Ok(true)
+}
+
+/// All half-edges that start where `first` does, in any order.
+#[inline]
+pub(crate) fn orbit<R: Reverses>(
+    edges: &mut R,
+    first: HalfEdge,
+    orbit: &mut Vec<HalfEdge>,
+) -> Result<(), R::Error> {
+    orbit.clear();
+    let mut h = first;
+    loop {
+        orbit.push(h);
+        h = edges.rev(prev(h))?;
+        if h == first {
+            return Ok(());
+        }
+        if h == BOUNDARY {
+            break;
+        }
+    }
+    let mut back = edges.rev(first)?;
+    while back != BOUNDARY {
+        let h = next(back);
+        orbit.push(h);
+        back = edges.rev(h)?;
+    }
+    Ok(())
 }

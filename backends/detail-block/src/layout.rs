@@ -3,94 +3,143 @@
 //! The forest is cut into complete subtrees of `l` levels from the roots down. Blocks are numbered depth-first, but that the
 //! child blocks of a block come one after the other: so a block names its children with one number and a set of flags
 //! instead of `2^l` numbers, and two siblings, which are always wanted together, lie together in the file.
+//!
+//! No walk through the forest is needed for that, which would jump about in the order of the collapses. In that order
+//! children come before their parents. So one pass from the last to the first collapse gives every node its level in its
+//! block; one from the first to the last counts the blocks below every node; and one back again hands numbers down, as the
+//! number of a block is that of the block above plus what comes between. A parent and its children are near each other in
+//! their rounds, so each pass goes through a few places of the arrays at once, from one end to the other.
 
+use bytemuck::{Pod, Zeroable};
 use vertex_tree::NONE;
 
-use crate::error::XfmError;
+use crate::error::{Failure, XfmError};
 use crate::numbering::{Levels, MOST_NODES};
-use crate::replay::Replay;
+use crate::replay::Merge;
+use crate::storage::{Elements, Storage};
 
-/// A block to be written.
-#[derive(Clone, Copy, Debug)]
+/// Where a node goes.
+#[derive(Clone, Copy, Debug, Pod, Zeroable)]
+#[repr(C)]
 pub(crate) struct Planned {
-    /// The collapse that is its root.
-    pub root: u32,
-    /// The number of the node above, or [`NONE`].
+    /// The number of the node.
+    pub number: u32,
+    /// Of the root of a block, the number of the node above, or [`NONE`].
     pub parent: u32,
+    /// The first of the child blocks of its block that are below it.
     pub first_child: u32,
-    /// As stored.
-    pub children: u32,
-    pub flags: u32,
+    /// The first child block of the first of these.
+    next: u32,
+    /// Its level in its block, 0 for the root.
+    pub level: u32,
+    /// How many child blocks of its block are below it.
+    pub child_blocks: u32,
+    /// How many blocks are below these.
+    beyond: u32,
 }
 
 /// Which node goes where.
-pub(crate) struct Layout {
-    pub levels: Levels,
-    pub blocks: Vec<Planned>,
-    /// For each collapse, the number of its node.
-    pub node_of: Vec<u32>,
+pub(crate) struct Layout<S: Storage> {
+    pub nodes: S::Array<Planned>,
+    /// From the last to the first: in ascending order of their numbers.
+    pub roots: S::Array<u32>,
+    pub blocks: u64,
     pub leaf_blocks: u64,
 }
 
-impl Layout {
-    pub fn new(replay: &Replay, levels: Levels) -> Result<Self, XfmError> {
-        let mut layout =
-            Self { levels, blocks: Vec::new(), node_of: vec![NONE; replay.merges.len()], leaf_blocks: 0 };
-        let mut places = Vec::new();
-        let mut stack = Vec::new();
-        for root in replay.roots() {
-            stack.push(layout.add(root, NONE)?);
-            while let Some(block) = stack.pop() {
-                layout.places(replay, layout.blocks[block as usize].root, &mut places);
-                let mut flags = 0;
-                for (offset, &node) in (0..).zip(&places).filter(|&(_, &node)| node != NONE) {
-                    flags |= 1 << offset;
-                    layout.node_of[node as usize] = levels.node(block, offset).0;
-                }
-                let (first_child, mut children) = (layout.blocks.len() as u32, 0);
-                let lowest = (levels.lowest()..).zip(&places[levels.lowest() as usize..]);
-                for (offset, &node) in lowest.filter(|&(_, &node)| node != NONE) {
-                    for (side, child) in (0..).zip(replay.merges[node as usize].children) {
-                        if child != NONE {
-                            children |= 1 << (2 * (offset - levels.lowest()) + side);
-                            layout.add(child, levels.node(block, offset).0)?;
-                        }
-                    }
-                }
-                if children == 0 {
-                    flags |= levels.leaf_bit();
-                    layout.leaf_blocks += 1;
-                }
-                let last = layout.blocks.len() as u32;
-                stack.extend((first_child..last).rev());
-                let planned = &mut layout.blocks[block as usize];
-                (planned.flags, planned.children) = (flags, children);
-                planned.first_child = if children == 0 { NONE } else { first_child };
+impl<S: Storage> Layout<S> {
+    pub fn new(merges: &mut S::Array<Merge>, levels: Levels, storage: &S) -> Result<Self, Failure> {
+        let blank = Planned {
+            number: NONE,
+            parent: NONE,
+            first_child: NONE,
+            next: NONE,
+            level: 0,
+            child_blocks: 0,
+            beyond: 0,
+        };
+        let mut layout = Self {
+            nodes: storage.array(merges.len(), blank, 25),
+            roots: storage.growing(0, 1),
+            blocks: 0,
+            leaf_blocks: 0,
+        };
+        for n in (0..merges.len()).rev() {
+            storage.check_stop()?;
+            let level = (layout.nodes.get(n)?.level + 1) % levels.get();
+            for child in children(&merges.get(n)?) {
+                layout.nodes.get_mut(child)?.level = level;
             }
+        }
+        for n in 0..merges.len() {
+            storage.check_stop()?;
+            layout.count(n, &merges.get(n)?, levels)?;
+        }
+        for n in (0..merges.len()).rev() {
+            storage.check_stop()?;
+            layout.number(n, &merges.get(n)?, levels)?;
         }
         Ok(layout)
     }
 
-    fn add(&mut self, root: u32, parent: u32) -> Result<u32, XfmError> {
-        let number = self.blocks.len() as u64;
-        let most = MOST_NODES >> self.levels.get();
-        if number >= most {
-            return Err(XfmError::TooLarge { what: "detail blocks", count: number + 1, most });
-        }
-        self.blocks.push(Planned { root, parent, first_child: NONE, children: 0, flags: 0 });
-        Ok(number as u32)
-    }
-
-    /// The collapses of a block by offset, [`NONE`] where there is none.
-    pub fn places(&self, replay: &Replay, root: u32, places: &mut Vec<u32>) {
-        places.clear();
-        places.resize(self.levels.full() as usize, NONE);
-        places[0] = root;
-        for offset in 0..self.levels.lowest() as usize {
-            if places[offset] != NONE {
-                let [kept, removed] = replay.merges[places[offset] as usize].children;
-                (places[2 * offset + 1], places[2 * offset + 2]) = (kept, removed);
+    fn count(&mut self, n: usize, merge: &Merge, levels: Levels) -> Result<(), Failure> {
+        let is_lowest = self.nodes.get(n)?.level + 1 == levels.get();
+        let (mut child_blocks, mut beyond) = (0, 0);
+        for child in children(merge) {
+            let child = self.nodes.get(child)?;
+            if is_lowest {
+                child_blocks += 1;
+                beyond += child.child_blocks + child.beyond;
+            } else {
+                child_blocks += child.child_blocks;
+                beyond += child.beyond;
             }
         }
+        let own = self.nodes.get_mut(n)?;
+        (own.child_blocks, own.beyond) = (child_blocks, beyond);
+        Ok(())
     }
+
+    fn number(&mut self, n: usize, merge: &Merge, levels: Levels) -> Result<(), Failure> {
+        let mut own = self.nodes.get(n)?;
+        if own.number == NONE {
+            self.roots.push(n as u32)?;
+            let block = self.blocks;
+            self.blocks += 1 + u64::from(own.child_blocks) + u64::from(own.beyond);
+            let most = MOST_NODES >> levels.get();
+            if self.blocks > most {
+                return Err(XfmError::TooLarge { what: "detail blocks", count: self.blocks, most }.into());
+            }
+            own.number = levels.node(block as u32, 0).0;
+            own.first_child = block as u32 + 1;
+            own.next = own.first_child + own.child_blocks;
+            *self.nodes.get_mut(n)? = own;
+        }
+        if own.level == 0 && own.child_blocks == 0 {
+            self.leaf_blocks += 1;
+        }
+        let is_lowest = own.level + 1 == levels.get();
+        let (mut first_child, mut next) = (own.first_child, own.next);
+        for (side, child) in (1..).zip(merge.children).filter(|&(_, child)| child != NONE) {
+            let child = self.nodes.get_mut(child as usize)?;
+            if is_lowest {
+                child.number = levels.node(first_child, 0).0;
+                child.parent = own.number;
+                (child.first_child, child.next) = (next, next + child.child_blocks);
+                first_child += 1;
+                next += child.child_blocks + child.beyond;
+            } else {
+                // The block's bits stay; the offset doubles.
+                child.number = own.number + levels.offset(vertex_tree::NodeId(own.number)) + side;
+                (child.first_child, child.next) = (first_child, next);
+                first_child += child.child_blocks;
+                next += child.beyond;
+            }
+        }
+        Ok(())
+    }
+}
+
+fn children(merge: &Merge) -> impl Iterator<Item = usize> {
+    merge.children.into_iter().filter(|&child| child != NONE).map(|child| child as usize)
 }

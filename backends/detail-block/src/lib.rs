@@ -23,6 +23,8 @@
 //! half-edges that vertex splits and half-edge collapses change ([`XfmTree`]). A block stays in memory while something in it
 //! is active, and goes when quotas say so, the least recently used first.
 
+mod arrange;
+mod arrangement;
 mod block;
 mod build;
 mod cone;
@@ -40,22 +42,26 @@ mod numbering;
 mod paging;
 mod quantize;
 mod removal;
+mod renumber;
 mod replay;
 mod requests;
 mod returns;
 mod settings;
 mod shown;
-mod split_apart;
+mod storage;
+mod surface;
 mod tree;
 mod vector;
 mod verify;
 mod well_formed;
 mod writing;
 
-pub use build::{Arrangement, BuildOptions, WriteReport, write};
+pub use arrangement::Arrangement;
+pub use build::{BuildOptions, WriteReport, needed_bytes, needed_disk_bytes, write, write_within};
 pub use error::XfmError;
 pub use file::XfmFile;
 pub use format::MAGIC;
 pub use paging::{ATTEMPTS, PagingCounts, SOON};
 pub use settings::{Io, Settings};
+pub use storage::Workspace;
 pub use tree::XfmTree;

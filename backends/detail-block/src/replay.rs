@@ -31,217 +31,233 @@
 //! without doubled triangles and without degenerate ones. So every set of active nodes that is closed under tree and needs
 //! shows such a mesh.
 
-use rustc_hash::FxHashMap;
-use vertex_tree::{CollapseLog, NONE};
+use std::io;
 
-use crate::half_edges::{Adjacent, BOUNDARY, HalfEdge, next, prev};
+use bytemuck::{Pod, Zeroable};
+use vertex_tree::NONE;
+
+use crate::error::Failure;
+use crate::half_edges::{Adjacent, BOUNDARY, HalfEdge, adjacent, fan, next, prev, triangle_of};
 use crate::nesting::Nesting;
-use crate::split_apart::Manifold;
+use crate::storage::{Elements, Storage};
+use crate::surface::Surface;
 
 /// A collapse that was made.
-#[derive(Clone, Copy, Debug)]
+#[derive(Clone, Copy, Debug, Pod, Zeroable)]
+#[repr(C)]
 pub(crate) struct Merge {
     pub removed: u32,
     pub kept: u32,
-    /// Half-edges of input triangles.
-    pub adjacent: Adjacent,
-    pub parent: u32,
+    /// The half-edges to the kept vertex and back: A and D.
+    pub edge: [HalfEdge; 2],
+    /// w x y z.
+    pub adjacent: [HalfEdge; 4],
     /// The nodes at the kept and at the removed vertex, or [`NONE`].
     pub children: [u32; 2],
 }
 
-/// The manifold mesh in its coarsest state and the collapses that led there.
-pub(crate) struct Replay {
-    pub manifold: Manifold,
-    pub merges: Vec<Merge>,
-    /// For each input triangle, the collapse that removed it, or [`NONE`].
-    pub owner: Vec<u32>,
-    /// Of a removed triangle, 4 for the one of D E F, plus which half-edge is A or D.
-    pub place: Vec<u8>,
-    /// Vertices that the log removes and that stay.
-    pub left_out: u64,
-    /// For each vertex, the input vertex at which it is in the log by now.
-    stands_at: Vec<u32>,
-    /// For an input vertex, the vertices beside itself that are there in the log by now.
-    others: FxHashMap<u32, Vec<u32>>,
-    /// For each vertex, the node at which it stands in the end, or [`NONE`].
-    top: Vec<u32>,
-    marks: Vec<(u32, u32)>,
-    stamp: u32,
-    orbit: Vec<HalfEdge>,
-    edges_of_removed: Vec<(u32, [HalfEdge; 2])>,
-    edges_of_kept: Vec<(u32, [HalfEdge; 2])>,
+/// A vertex at the other end of an edge, and the half-edges there and back.
+type Edge = (u32, [HalfEdge; 2]);
+
+/// The manifold mesh on its way to its coarsest state.
+pub(crate) struct Replay<'s, S: Storage> {
+    surface: &'s mut Surface<S>,
+    merges: S::Array<Merge>,
+    around: Vec<HalfEdge>,
+    edges_of_removed: Vec<Edge>,
+    edges_of_kept: Vec<Edge>,
+    /// The vertices around the kept one, ascending.
+    ring_of_kept: Vec<u32>,
     fan: Vec<HalfEdge>,
 }
 
-impl Replay {
-    /// Replays a log. `nesting` is told of every collapse.
-    pub fn new<E>(
-        log: &CollapseLog,
-        manifold: Manifold,
-        nesting: &mut Nesting,
-        mut add: impl FnMut(&mut Nesting, &Step<'_>) -> Result<(), E>,
-    ) -> Result<Self, E> {
-        let (vertices, triangles) = (manifold.origin.len(), log.mesh.triangles.len());
-        let manifold_origin = manifold.origin.clone();
-        let mut others: FxHashMap<u32, Vec<u32>> = FxHashMap::default();
-        for (copy, &origin) in (0..).zip(&manifold.origin) {
-            if copy != origin {
-                others.entry(origin).or_default().push(copy);
-            }
-        }
+/// What came of a replay: the collapses that were made, and how many vertices the log removes that stay.
+pub(crate) struct Replayed<S: Storage> {
+    pub merges: S::Array<Merge>,
+    pub left_out: u64,
+}
+
+impl<'s, S: Storage> Replay<'s, S> {
+    /// Replays the log of a mesh; a triangle that is removed loses its first corner. `nesting` is told of every collapse.
+    pub fn run(
+        surface: &'s mut Surface<S>,
+        nesting: &mut Nesting<S>,
+        storage: &S,
+    ) -> Result<Replayed<S>, Failure> {
+        let merges = storage.growing(surface.kept.len(), 2);
         let mut replay = Self {
-            manifold,
-            merges: Vec::with_capacity(log.collapses.len()),
-            owner: vec![NONE; triangles],
-            place: vec![0; triangles],
-            left_out: 0,
-            stands_at: manifold_origin,
-            others,
-            top: vec![NONE; vertices],
-            marks: vec![(0, 0); vertices],
-            stamp: 0,
-            orbit: Vec::new(),
+            surface,
+            merges,
+            around: Vec::new(),
             edges_of_removed: Vec::new(),
             edges_of_kept: Vec::new(),
+            ring_of_kept: Vec::new(),
             fan: Vec::new(),
         };
         let mut removed = Vec::new();
-        for collapse in &log.collapses {
+        for n in 0..replay.surface.kept.len() {
+            storage.check_stop()?;
+            let eps = replay.surface.eps.get(n)?;
+            let kept = replay.surface.kept.get(n)?;
+            // All that are at the removed vertex: the list changes where one is put off.
             removed.clear();
-            removed.push(collapse.removed);
-            removed.append(&mut replay.others.remove(&collapse.removed).unwrap_or_default());
+            let mut v = replay.surface.origins.get(n)?.first;
+            while v != NONE {
+                removed.push(v);
+                v = replay.surface.vertices.get(v as usize)?.next;
+            }
             for &v in &removed {
-                if replay.manifold.out[v as usize] == BOUNDARY {
-                    continue;
-                }
-                match replay.find_legal(v, collapse.kept) {
-                    None => {
-                        replay.stands_at[v as usize] = collapse.kept;
-                        replay.others.entry(collapse.kept).or_default().push(v);
-                    }
-                    Some((u, [a, d])) => {
-                        let adjacent = replay.manifold.edges.adjacent(a, d);
-                        let _ = replay.manifold.edges.fan(adjacent, &mut replay.fan);
-                        let step = Step {
-                            removed: v,
-                            kept: u,
-                            children: [replay.top[u as usize], replay.top[v as usize]],
-                            edge: [a, d],
-                            adjacent,
-                            fan: &replay.fan,
-                            far: replay.far([a, d]),
-                            eps: collapse.bounds.eps,
-                        };
-                        add(nesting, &step)?;
-                        replay.collapse(v, u, [a, d], adjacent);
-                    }
-                }
+                replay.remove(v, kept, eps, nesting)?;
             }
         }
-        let is_left =
-            |v: usize| replay.manifold.out[v] != BOUNDARY && replay.stands_at[v] != replay.manifold.origin[v];
-        replay.left_out = (0..vertices).filter(|&v| is_left(v)).count() as u64;
-        Ok(replay)
+        let Self { surface, merges, .. } = replay;
+        let mut left_out = 0;
+        for v in 0..surface.vertices.len() {
+            let vertex = surface.vertices.get(v)?;
+            left_out += u64::from(vertex.out != BOUNDARY && vertex.stands_at != vertex.origin);
+        }
+        Ok(Replayed { merges, left_out })
     }
 
-    /// The roots, from the last to the first.
-    pub fn roots(&self) -> impl Iterator<Item = u32> + '_ {
-        (0..self.merges.len() as u32).rev().filter(|&n| self.merges[n as usize].parent == NONE)
+    /// Merges a vertex into one of those that `kept` has become, or puts it off.
+    fn remove(&mut self, v: u32, kept: u32, eps: f32, nesting: &mut Nesting<S>) -> Result<(), Failure> {
+        let vertex = self.surface.vertices.get(v as usize)?;
+        if vertex.out == BOUNDARY {
+            return Ok(());
+        }
+        let Some((u, [a, d])) = self.find_legal(v, kept)? else {
+            let vertex = self.surface.vertices.get_mut(v as usize)?;
+            (vertex.stands_at, vertex.next) = (kept, NONE);
+            self.surface.append(kept, v)?;
+            return Ok(());
+        };
+        let adjacent = adjacent(&mut self.surface.faces, a, d)?;
+        let _ = fan(&mut self.surface.faces, adjacent, &mut self.fan)?;
+        let far = self.far([a, d])?;
+        let step = Step {
+            removed: v,
+            kept: u,
+            children: [self.surface.vertices.get(u as usize)?.top, vertex.top],
+            edge: [a, d],
+            adjacent,
+            fan: &self.fan,
+            far,
+            eps,
+        };
+        nesting.add(self.surface, &step)?;
+        let children = step.children;
+        self.collapse(v, u, [a, d], adjacent, children, far)?;
+        Ok(())
     }
 
     /// The far corners p and q, or [`NONE`] where there is no triangle.
-    fn far(&self, [a, d]: [HalfEdge; 2]) -> [u32; 2] {
-        [a, d].map(|h| if h == BOUNDARY { NONE } else { self.manifold.edges.start(prev(h)) })
+    fn far(&mut self, [a, d]: [HalfEdge; 2]) -> io::Result<[u32; 2]> {
+        let mut far = |h| if h == BOUNDARY { Ok(NONE) } else { self.surface.faces.start(prev(h)) };
+        Ok([far(a)?, far(d)?])
     }
 
     /// A vertex that `kept` has become and into which `v` may be merged, and the half-edges to it and back.
-    fn find_legal(&mut self, v: u32, kept: u32) -> Option<(u32, [HalfEdge; 2])> {
+    fn find_legal(&mut self, v: u32, kept: u32) -> io::Result<Option<Edge>> {
         let mut edges = std::mem::take(&mut self.edges_of_removed);
-        self.manifold.edges_of(v, &mut self.orbit, &mut edges);
-        let candidates = edges.iter().filter(|&&(u, _)| self.stands_at[u as usize] == kept);
-        let found = candidates.copied().collect::<Vec<_>>();
-        let legal = found.into_iter().find(|&(u, edge)| self.is_legal(u, edge, &edges));
+        self.surface.edges_of(v, &mut self.around, &mut edges)?;
+        let mut legal = None;
+        for &(u, edge) in &edges {
+            if self.surface.vertices.get(u as usize)?.stands_at == kept && self.is_legal(u, edge, &edges)? {
+                legal = Some((u, edge));
+                break;
+            }
+        }
         self.edges_of_removed = edges;
-        legal
+        Ok(legal)
     }
 
-    fn is_legal(&mut self, u: u32, [a, d]: [HalfEdge; 2], around_v: &[(u32, [HalfEdge; 2])]) -> bool {
-        let edges = &self.manifold.edges;
-        let adjacent = edges.adjacent(a, d);
+    fn is_legal(&mut self, u: u32, [a, d]: [HalfEdge; 2], around_v: &[Edge]) -> io::Result<bool> {
+        let adjacent = adjacent(&mut self.surface.faces, a, d)?;
         let nothing_beside = |h: HalfEdge, side: bool| h != BOUNDARY && !side;
         let [first, second] = adjacent.sides();
         if nothing_beside(a, first) || nothing_beside(d, second) {
-            return false;
+            return Ok(false);
         }
-        let is_open = |edges: &[(u32, [HalfEdge; 2])]| edges.iter().any(|(_, pair)| pair.contains(&BOUNDARY));
-        self.manifold.edges_of(u, &mut self.orbit, &mut self.edges_of_kept);
+        let is_open = |edges: &[Edge]| edges.iter().any(|(_, pair)| pair.contains(&BOUNDARY));
+        self.surface.edges_of(u, &mut self.around, &mut self.edges_of_kept)?;
         if a != BOUNDARY && d != BOUNDARY && is_open(around_v) && is_open(&self.edges_of_kept) {
-            return false;
+            return Ok(false);
         }
-        self.stamp += 1;
-        for &(w, _) in &self.edges_of_kept {
-            let mark = &mut self.marks[w as usize];
-            *mark = (self.stamp, if mark.0 == self.stamp { mark.1 + 1 } else { 1 });
-        }
-        let [p, q] = self.far([a, d]);
+        let ring = &mut self.ring_of_kept;
+        ring.clear();
+        ring.extend(self.edges_of_kept.iter().map(|&(w, _)| w));
+        ring.sort_unstable();
+        let [p, q] = self.far([a, d])?;
+        let ring = &self.ring_of_kept;
         let mut seen = [0; 3];
         for &(w, _) in around_v {
-            let (stamp, count) = self.marks[w as usize];
+            let at = ring.partition_point(|&x| x < w);
+            let count = ring[at..].iter().take_while(|&&x| x == w).count();
             match [u, p, q].iter().position(|&x| x == w) {
                 Some(which) => {
                     seen[which] += 1;
                     if seen[which] > 1 || (which > 0 && count != 1) {
-                        return false;
+                        return Ok(false);
                     }
                 }
-                None if stamp == self.stamp => return false,
+                None if count > 0 => return Ok(false),
                 None => {}
             }
         }
-        let edges = &self.manifold.edges;
-        let closes = |around: &[(u32, [HalfEdge; 2])]| {
-            around.iter().any(|&(w, [h, _])| {
-                h != BOUNDARY && (w == p && edges.start(prev(h)) == q || w == q && edges.start(prev(h)) == p)
-            })
+        if p == NONE || q == NONE {
+            return Ok(true);
+        }
+        let faces = &mut self.surface.faces;
+        let mut closes = |around: &[Edge]| {
+            for &(w, [h, _]) in around {
+                if h != BOUNDARY && (w == p || w == q) {
+                    let before = faces.start(prev(h))?;
+                    if w == p && before == q || w == q && before == p {
+                        return io::Result::Ok(true);
+                    }
+                }
+            }
+            Ok(false)
         };
-        p == NONE || q == NONE || !(closes(around_v) && closes(&self.edges_of_kept))
+        Ok(!(closes(around_v)? && closes(&self.edges_of_kept)?))
     }
 
-    fn collapse(&mut self, v: u32, u: u32, edge: [HalfEdge; 2], adjacent: Adjacent) {
+    fn collapse(
+        &mut self,
+        v: u32,
+        u: u32,
+        edge: [HalfEdge; 2],
+        adjacent: Adjacent,
+        children: [u32; 2],
+        far: [u32; 2],
+    ) -> io::Result<()> {
         let node = self.merges.len() as u32;
         let Adjacent { w, x, y, z } = adjacent;
-        let far = self.far(edge);
-        let edges = &mut self.manifold.edges;
+        let Surface { faces, vertices, .. } = &mut *self.surface;
         for &h in &self.fan {
-            edges.set_start(h, u);
+            let (t, k) = triangle_of(h);
+            faces.0.get_mut(t)?.start[k] = u;
         }
-        edges.pair(w, x);
-        edges.pair(y, z);
-        let out = &mut self.manifold.out;
+        faces.pair(w, x)?;
+        faces.pair(y, z)?;
         let first_of = |h: HalfEdge, otherwise: HalfEdge| if h == BOUNDARY { next(otherwise) } else { h };
+        let mut out = vertices.get(u as usize)?.out;
         // w starts at p and x at u; y at q and z at u.
         if far[0] != NONE {
-            out[far[0] as usize] = first_of(w, x);
-            out[u as usize] = first_of(x, w);
+            vertices.get_mut(far[0] as usize)?.out = first_of(w, x);
+            out = first_of(x, w);
         }
         if far[1] != NONE {
-            out[far[1] as usize] = first_of(y, z);
-            out[u as usize] = first_of(z, y);
+            vertices.get_mut(far[1] as usize)?.out = first_of(y, z);
+            out = first_of(z, y);
         }
-        out[v as usize] = BOUNDARY;
-        for (side, h) in (0..).zip(edge) {
-            if h != BOUNDARY {
-                self.owner[(h >> 2) as usize] = node;
-                self.place[(h >> 2) as usize] = side << 2 | (h & 3) as u8;
-            }
+        let kept = vertices.get_mut(u as usize)?;
+        (kept.out, kept.top) = (out, node);
+        vertices.get_mut(v as usize)?.out = BOUNDARY;
+        for h in edge.into_iter().filter(|&h| h != BOUNDARY) {
+            faces.0.get_mut(triangle_of(h).0)?.start[0] = NONE;
         }
-        let children = [self.top[u as usize], self.top[v as usize]];
-        for child in children.into_iter().filter(|&child| child != NONE) {
-            self.merges[child as usize].parent = node;
-        }
-        self.top[u as usize] = node;
-        self.merges.push(Merge { removed: v, kept: u, adjacent, parent: NONE, children });
+        self.merges.push(Merge { removed: v, kept: u, edge, adjacent: [w, x, y, z], children })
     }
 }
 

@@ -1,136 +1,217 @@
-//! Writing an XFM file from front to back: steps 3 and 5 to 7 of the paper's construction.
+//! Writing an XFM file: steps 3 and 5 to 7 of the paper's construction.
+//!
+//! Blocks are written in order, so nodes are sorted by their numbers. The index, whose place is before them, follows when all
+//! of their lengths are known.
 
-use std::io::{self, BufWriter, Write};
+use std::io::{self, BufWriter, Seek, SeekFrom, Write};
 use std::path::Path;
 
-use vertex_tree::{NONE, output};
+use vertex_tree::{NONE, NodeId, output};
 
-use crate::build::{Arrangement, WriteReport};
-use crate::error::XfmError;
+use crate::arrange::Arranged;
+use crate::build::WriteReport;
+use crate::error::Failure;
 use crate::format::{OFFSET_BITS, block_sum};
-use crate::half_edges::{BOUNDARY, HalfEdge};
 use crate::node::Stored;
-use crate::numbering::{face_half_edge, node_half_edge};
+use crate::storage::{Elements, Storage};
 
-impl Arrangement {
-    /// Writes the file: to a temporary name, synced, then renamed.
-    ///
-    /// # Errors
-    /// [`XfmError::Write`]; nothing is left behind then.
-    pub fn write(&self, path: &Path) -> Result<WriteReport, XfmError> {
+impl<S: Storage> Arranged<S> {
+    /// Writes the file: to a temporary name, synced, then renamed. Nothing is left behind if it fails.
+    pub fn write(&mut self, path: &Path, storage: &S) -> Result<WriteReport, Failure> {
+        let mut failed = None;
         output::write_with(path, |file| {
             let mut out = BufWriter::with_capacity(1 << 20, file);
-            self.write_to(&mut out)?;
+            if let Err(failure) = self.write_to(&mut out, storage) {
+                failed = Some(failure);
+                return Err(io::ErrorKind::Other.into());
+            }
             out.flush()
         })
-        .map_err(|source| XfmError::Write { file: path.display().to_string(), source })?;
+        .map_err(|source| failed.unwrap_or(Failure::Output(source)))?;
         Ok(self.report())
     }
 
-    /// Writes what the file holds, from front to back.
-    ///
-    /// # Errors
-    /// What `out` says.
-    pub fn write_to(&self, out: &mut impl Write) -> io::Result<()> {
-        out.write_all(&self.header.encode())?;
-        let (positions, normals) = (&self.nesting.positions, &self.nesting.normals);
-        write_section(out, self.initial.iter(), |&v, bytes| {
-            for x in positions[v as usize].iter().chain(&normals[v as usize]) {
-                bytes.extend_from_slice(&x.to_le_bytes());
-            }
-        })?;
-        write_section(out, self.faces.iter(), |&t, bytes| {
-            let triangle = self.replay.manifold.edges.triangles[t as usize];
-            let vertex = |v| self.initial.partition_point(|&initial| initial < v) as u32;
-            for word in triangle.start.map(vertex).into_iter().chain(triangle.rev.map(|h| self.number(h))) {
-                bytes.extend_from_slice(&word.to_le_bytes());
-            }
-        })?;
-        write_section(out, self.replay.roots(), |n, bytes| {
-            bytes.extend_from_slice(&self.layout.node_of[n as usize].to_le_bytes());
-            let bounds = self.nesting.bounds[n as usize];
-            for x in bounds.center.into_iter().chain([bounds.radius, bounds.eps]) {
-                bytes.extend_from_slice(&x.to_le_bytes());
-            }
-        })?;
-        let mut at = self.header.sections()[4];
-        write_section(out, self.lengths.iter(), |&length, bytes| {
-            bytes.extend_from_slice(&(at | u64::from(length) << OFFSET_BITS).to_le_bytes());
-            at += u64::from(length);
-        })?;
-        let (mut places, mut bytes) = (Vec::new(), Vec::new());
-        for block in 0..self.layout.blocks.len() as u32 {
-            bytes.clear();
-            self.encode_block(block, &mut places, &mut bytes);
-            out.write_all(&bytes)?;
+    /// Writes what the file holds.
+    pub fn write_to(&mut self, out: &mut (impl Write + Seek), storage: &S) -> Result<(), Failure> {
+        let [_, _, _, index_at, blocks_at] = self.header.sections();
+        out.write_all(&self.header.encode()).map_err(Failure::Output)?;
+        let mut section = Section::new(out);
+        for v in 0..self.initial_vertices.len() {
+            section.put(&self.initial_vertices.get(v)?)?;
         }
-        Ok(())
+        section.end()?;
+        for t in 0..self.initial_faces.len() {
+            let [a, b, c, reverses @ ..] = self.initial_faces.get(t)?;
+            section.put(&[a, b, c])?;
+            for h in reverses {
+                section.put(&[self.number(h)?])?;
+            }
+        }
+        section.end()?;
+        for i in 0..self.layout.roots.len() {
+            let n = self.layout.roots.get(i)? as usize;
+            let node = self.nodes.get(n)?;
+            section.put(&[self.layout.nodes.get(n)?.number])?;
+            section.put(&node.center.map(f32::to_bits))?;
+            section.put(&[node.radius, node.eps].map(f32::to_bits))?;
+        }
+        section.end()?;
+        out.seek(SeekFrom::Start(blocks_at)).map_err(Failure::Output)?;
+        let mut lengths = self.write_blocks(out, storage)?;
+        out.seek(SeekFrom::Start(index_at)).map_err(Failure::Output)?;
+        let (mut at, mut section) = (blocks_at, Section::new(out));
+        for block in 0..lengths.len() {
+            let length = u64::from(lengths.get(block)?);
+            let entry = at | length << OFFSET_BITS;
+            section.put(&[entry as u32, (entry >> 32) as u32])?;
+            at += length;
+        }
+        section.end()
     }
 
-    /// The file's number of a half-edge of an input triangle.
-    fn number(&self, h: HalfEdge) -> u32 {
-        if h == BOUNDARY {
-            return BOUNDARY;
-        }
-        let (t, k) = ((h >> 2) as usize, h & 3);
-        match self.replay.owner[t] {
-            NONE => face_half_edge(self.face_of[t], k),
-            n => {
-                let place = u32::from(self.replay.place[t]);
-                // A or D is number 0.
-                node_half_edge(self.layout.node_of[n as usize], place >> 2, (k + 3 - (place & 3)) % 3)
+    /// Writes the blocks, and says how long each is.
+    fn write_blocks(&mut self, out: &mut impl Write, storage: &S) -> Result<S::Array<u32>, Failure> {
+        let levels = self.header.levels;
+        let mut sorter = storage.sorter::<RECORD>(25);
+        for n in 0..self.merges.len() {
+            storage.check_stop()?;
+            let (merge, node, planned) = (self.merges.get(n)?, self.nodes.get(n)?, self.layout.nodes.get(n)?);
+            let mut children = 0;
+            if planned.level + 1 == levels.get() {
+                let present = merge.children.map(|child| u32::from(child != NONE));
+                children = present[0] | present[1] << 1;
             }
+            let [x, y, z] = node.center.map(f32::to_bits);
+            let [a, b, c] = node.axis.map(f32::to_bits);
+            let [radius, sine, eps] = [node.radius, node.sine, node.eps].map(f32::to_bits);
+            let mut adjacent = merge.adjacent;
+            for h in &mut adjacent {
+                *h = self.number(*h)?;
+            }
+            let [p, q, r, s] = adjacent;
+            let place = [planned.number, planned.parent, planned.first_child, children];
+            let [number, parent, first_child, children] = place;
+            sorter.push([
+                number,
+                parent,
+                first_child,
+                children,
+                x,
+                y,
+                z,
+                a,
+                b,
+                c,
+                radius,
+                sine,
+                p,
+                q,
+                r,
+                s,
+                eps,
+            ])?;
+        }
+        let mut lengths = storage.growing(self.header.blocks as usize, 1);
+        let (mut block, mut bytes, mut failed) = (Vec::new(), Vec::new(), None);
+        let mut close = |block: &mut Vec<[u32; RECORD]>| {
+            if block.is_empty() {
+                return Ok(());
+            }
+            self.encode_block(block, &mut bytes);
+            block.clear();
+            lengths.push(bytes.len() as u32)?;
+            out.write_all(&bytes).map_err(|error| {
+                failed = Some(error);
+                io::Error::from(io::ErrorKind::Other)
+            })
+        };
+        let outcome = sorter.finish(|record| {
+            storage.check_stop()?;
+            let number = |record: &[u32; RECORD]| levels.block(NodeId(record[0]));
+            if block.last().is_some_and(|last| number(last) != number(&record)) {
+                close(&mut block)?;
+            }
+            block.push(record);
+            Ok(())
+        });
+        let outcome = outcome.and_then(|()| close(&mut block));
+        match failed {
+            Some(error) => Err(Failure::Output(error)),
+            None => Ok(outcome.map(|()| lengths)?),
         }
     }
 
-    fn encode_block(&self, block: u32, places: &mut Vec<u32>, bytes: &mut Vec<u8>) {
-        let planned = self.layout.blocks[block as usize];
-        let set = self.header.levels.flag_bytes();
-        bytes.extend_from_slice(&planned.flags.to_le_bytes()[..set]);
-        bytes.extend_from_slice(&planned.parent.to_le_bytes());
-        if planned.children != 0 {
-            bytes.extend_from_slice(&planned.first_child.to_le_bytes());
-            bytes.extend_from_slice(&planned.children.to_le_bytes()[..set]);
-        }
-        self.layout.places(&self.replay, planned.root, places);
-        for &n in places.iter().filter(|&&n| n != NONE) {
-            let n = n as usize;
-            let merge = &self.replay.merges[n];
-            let bounds = self.nesting.bounds[n];
-            let adjacent = merge.adjacent;
-            Stored {
-                position: bounds.center,
-                normal: self.nesting.normals[merge.removed as usize],
-                radius: bounds.radius,
-                sine: self.nesting.sines[n],
-                adjacent: [adjacent.w, adjacent.x, adjacent.y, adjacent.z].map(|h| self.number(h)),
-                eps: bounds.eps,
+    /// The bytes of a block of these nodes, which are in the order of their offsets.
+    fn encode_block(&self, nodes: &[[u32; RECORD]], bytes: &mut Vec<u8>) {
+        let levels = self.header.levels;
+        let set = levels.flag_bytes();
+        let [number, parent, first_child, ..] = nodes[0];
+        let (mut flags, mut children) = (0, 0);
+        for node in nodes {
+            let offset = levels.offset(NodeId(node[0]));
+            flags |= 1 << offset;
+            if offset >= levels.lowest() {
+                children |= node[3] << (2 * (offset - levels.lowest()));
             }
-            .encode(self.header.quantisation(), bytes);
         }
-        let sum = block_sum(block, bytes);
+        if children == 0 {
+            flags |= levels.leaf_bit();
+        }
+        bytes.clear();
+        bytes.extend_from_slice(&flags.to_le_bytes()[..set]);
+        bytes.extend_from_slice(&parent.to_le_bytes());
+        if children != 0 {
+            bytes.extend_from_slice(&first_child.to_le_bytes());
+            bytes.extend_from_slice(&children.to_le_bytes()[..set]);
+        }
+        for &[_, _, _, _, x, y, z, a, b, c, radius, sine, p, q, r, s, eps] in nodes {
+            let stored = Stored {
+                position: [x, y, z].map(f32::from_bits),
+                normal: [a, b, c].map(f32::from_bits),
+                radius: f32::from_bits(radius),
+                sine: f32::from_bits(sine),
+                adjacent: [p, q, r, s],
+                eps: f32::from_bits(eps),
+            };
+            stored.encode(self.header.quantisation(), bytes);
+        }
+        let sum = block_sum(levels.block(NodeId(number)), bytes);
         bytes.extend_from_slice(&sum.to_le_bytes());
     }
 }
 
-/// Writes records and their checksum.
-fn write_section<T>(
-    out: &mut impl Write,
-    records: impl Iterator<Item = T>,
-    mut encode: impl FnMut(T, &mut Vec<u8>),
-) -> io::Result<()> {
-    const CHUNK: usize = 1 << 16;
-    let mut sum = crc32fast::Hasher::new();
-    let mut bytes = Vec::with_capacity(CHUNK + 64);
-    for record in records {
-        encode(record, &mut bytes);
-        if bytes.len() >= CHUNK {
-            sum.update(&bytes);
-            out.write_all(&bytes)?;
-            bytes.clear();
-        }
+/// Words of a node on its way to its place: number; of the root of a block, the number of the node above and the first child
+/// block; of a node of the lowest level, which children there are; position, normal, radius, sine, w x y z, eps.
+const RECORD: usize = 17;
+
+/// Records with a checksum at the end.
+struct Section<'o, W> {
+    out: &'o mut W,
+    sum: crc32fast::Hasher,
+    bytes: Vec<u8>,
+}
+
+impl<'o, W: Write> Section<'o, W> {
+    fn new(out: &'o mut W) -> Self {
+        Self { out, sum: crc32fast::Hasher::new(), bytes: Vec::new() }
     }
-    sum.update(&bytes);
-    out.write_all(&bytes)?;
-    out.write_all(&sum.finalize().to_le_bytes())
+
+    fn put(&mut self, words: &[u32]) -> Result<(), Failure> {
+        self.bytes.extend(words.iter().flat_map(|word| word.to_le_bytes()));
+        if self.bytes.len() >= 1 << 16 { self.flush() } else { Ok(()) }
+    }
+
+    fn flush(&mut self) -> Result<(), Failure> {
+        self.sum.update(&self.bytes);
+        self.out.write_all(&self.bytes).map_err(Failure::Output)?;
+        self.bytes.clear();
+        Ok(())
+    }
+
+    /// Writes the checksum. What follows is the next section.
+    fn end(&mut self) -> Result<(), Failure> {
+        self.flush()?;
+        let sum = std::mem::take(&mut self.sum).finalize();
+        self.out.write_all(&sum.to_le_bytes()).map_err(Failure::Output)
+    }
 }

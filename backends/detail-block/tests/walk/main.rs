@@ -3,6 +3,7 @@
 mod damage;
 mod driver;
 mod foresight;
+mod memory;
 mod meshes;
 mod paging;
 
