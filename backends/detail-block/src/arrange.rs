@@ -108,7 +108,7 @@ impl<S: Storage> Arranged<S> {
         }
         let (t, k) = triangle_of(h);
         let first = self.triangles.get(t)?;
-        Ok(first & !3 | (k as u32 + 3 - (first & 3)) % 3)
+        Ok((first & !3) | ((k as u32 + 3 - (first & 3)) % 3))
     }
 
     /// What the file will hold.

@@ -11,6 +11,7 @@ use crate::arrange::Arranged;
 use crate::build::{BuildOptions, WriteReport};
 use crate::error::{Failure, XfmError};
 use crate::half_edges::triangle_of;
+use crate::nesting::Node;
 use crate::numbering::{Owner, owner};
 use crate::storage::Memory;
 use crate::surface::Surface;
@@ -101,7 +102,7 @@ impl Arrangement {
     #[must_use]
     pub fn cones(&self) -> Vec<NormalCone> {
         let arranged = self.arranged.borrow();
-        let mut cones: Vec<_> = arranged.nodes.iter().map(|node| node.cone()).collect();
+        let mut cones: Vec<_> = arranged.nodes.iter().map(Node::cone).collect();
         for &root in &arranged.layout.roots {
             cones[root as usize] = NormalCone::NONE;
         }

@@ -52,8 +52,14 @@ fn the_file_is_the_same_whatever_the_memory() {
     std::fs::create_dir(&temporary).unwrap();
     let stop = &AtomicBool::new(false);
     let mut random = Random(5);
-    let meshes =
-        [grid(45, &mut random), torus(30, &mut random), rubble(35, &mut random), several(&mut random)];
+    // Spheres nested along random collapses soon grow too large to be quantised: that is for the smallest mesh.
+    let meshes = [
+        rubble(13, &mut random),
+        grid(45, &mut random),
+        torus(30, &mut random),
+        rubble(35, &mut random),
+        several(&mut random),
+    ];
     for (i, mesh) in (0..).zip(&meshes) {
         for mesh in [mesh, &shuffled(mesh, &mut random)] {
             let log = random_log(mesh.clone(), &mut random);
