@@ -8,7 +8,8 @@
 //!   along a path, against the in-memory tree, whose nodes are single collapses.
 //! * `figures`: the paper's figures 4 and 5: the sum of read operations and the memory over the frames, for an object that
 //!   comes near and one that turns, for all four cache modes and both orders of the partitioning queue.
-//! * `selection`: what finding the changes takes, by displayed triangle, everything in memory, against the in-memory tree.
+//! * `selection`: what finding the changes takes, by displayed triangle, everything in memory and paging, against the in-memory
+//!   tree and meta-nodes.
 //!
 //! Frames are settled: each waits for its pages, and its cut is compared between modes; another cut fails the benchmark.
 
