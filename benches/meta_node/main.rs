@@ -1,6 +1,7 @@
 //! Meta-node trees against the in-memory tree and against virtual memory: the tables of El-Sana & Chiang (2000).
 //!
-//! `cargo bench --bench meta_node -- [construction] [selection] [working-set] [misses] [frames]`; all of them without a word.
+//! `cargo bench --bench meta_node -- [construction] [selection] [working-set] [misses [MESH...]] [frames]`; all of them without
+//! a word.
 //!
 //! * `construction`: their Table 1, processor time of the collapse log and of the meta-nodes, sizes of the files, and the
 //!   place holders that levels and pages of other sizes would make.
@@ -38,7 +39,7 @@ fn main() {
         working_set::table();
     }
     if is_chosen("misses") {
-        misses::table();
+        misses::table(&words);
     }
     if is_chosen("frames") {
         frames::table();

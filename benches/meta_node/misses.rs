@@ -35,12 +35,18 @@ const FRAME: Duration = Duration::from_micros(16_667);
 /// In real time, so many frames: 20 seconds.
 const REAL_FRAMES: usize = 1200;
 
-pub fn table() {
+/// Of the meshes that are named, or of all.
+pub fn table(words: &[String]) {
+    let is_named = |name: &str| words.iter().any(|word| word == name);
+    let is_choice = PATHS.iter().any(|(name, ..)| is_named(name));
     println!(
         "path   mesh     memory  in use  prefetch  latency    frames  misses %  frames with a miss %  changes  reads/frame  \
          of these ahead %, used %  no room  active"
     );
     for (name, (trajectory, mode, rate), pixels) in PATHS {
+        if is_choice && !is_named(name) {
+            continue;
+        }
         let Some((log, _)) = log(name) else { continue };
         let Some(walk) = imported(trajectory, &log, mode, rate) else { continue };
         let path = meta_nodes(name, &log, &BuildOptions::default());

@@ -176,8 +176,9 @@ pub fn build_within(
         next_id: 0,
         stop: limits.stop,
         threads: limits.threads.max(1),
-        // The allocator keeps memory back for each thread that has freed it.
-        whole_bytes: memory - memory / 8,
+        // The allocator keeps back what windows have taken, for each thread that has freed them: there must be room beside
+        // it for all that is left, and for several threads' windows.
+        whole_bytes: memory / 8 * 5,
         window_bytes: if limits.threads > 1 { memory / 8 * 5 } else { memory - memory / 8 },
         sort_bytes: (memory / 32) as usize,
         log: Log::new(&scratch).map_err(temporary)?,

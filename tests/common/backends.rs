@@ -13,7 +13,7 @@ use foldfront::engine::{Engine, FrameReport, Settings};
 use foldfront::oracle::Oracle;
 use foldfront::refine::Strategy;
 use foldfront::vertex_tree::source::MemorySource;
-use foldfront::vertex_tree::{NullSink, VertexTree};
+use foldfront::vertex_tree::{NullSink, Prefetch, VertexTree};
 use foldfront::view::View;
 use in_memory::{Hierarchy, InMemoryTree};
 use meta_node::{MetaNodeFile, MetaNodeTree};
@@ -64,6 +64,12 @@ const BACKENDS: [(&str, Open); 6] = [
     ("detail-block", |log, settings| detail::follow(log, settings, false, false)),
     ("detail-block quantised, normal cone", |log, settings| detail::follow(log, settings, true, true)),
 ];
+
+/// Every exact strategy with every way to fetch ahead.
+pub fn combinations() -> impl Iterator<Item = (Strategy, Prefetch)> {
+    let exact = Strategy::ALL.into_iter().filter(|strategy| strategy.is_exact());
+    exact.flat_map(|strategy| Prefetch::ALL.map(|prefetch| (strategy, prefetch)))
+}
 
 /// The hierarchy as a file of meta-nodes, kept in memory.
 pub fn meta_node_file(log: &CollapseLog, options: &meta_node::BuildOptions) -> Arc<MetaNodeFile> {

@@ -12,7 +12,7 @@ use foldfront::vertex_tree::{NodeId, NullSink, Prefetch, VertexTree};
 use foldfront::view::View;
 use meta_node::{InUse, Io, MetaNodeFile, MetaNodeTree};
 
-use crate::common::backends::meta_node_file;
+use crate::common::backends::{combinations, meta_node_file};
 use crate::common::{Random, random_step, random_view};
 use crate::{PAGES, grid, holder_bytes, settings};
 
@@ -22,7 +22,7 @@ fn engine(
     file: &Arc<MetaNodeFile>,
     page_memory: u64,
     in_use: InUse,
-    prefetch: Prefetch,
+    (strategy, prefetch): (Strategy, Prefetch),
     store: Simulated,
 ) -> Engine<MetaNodeTree, NullSink> {
     let paging = meta_node::Settings {
@@ -32,8 +32,7 @@ fn engine(
         io: Io::Simulated(store),
         ..meta_node::Settings::default()
     };
-    Engine::new(MetaNodeTree::new(file.clone(), paging).unwrap(), NullSink, settings(Strategy::Event))
-        .unwrap()
+    Engine::new(MetaNodeTree::new(file.clone(), paging).unwrap(), NullSink, settings(strategy)).unwrap()
 }
 
 fn advance(engine: &mut Engine<MetaNodeTree, NullSink>, view: View) -> FrameReport {
@@ -70,11 +69,11 @@ fn a_camera_that_stops_gets_its_cut_in_time() {
     let depth = page_depth(&file);
     assert!(depth > 3, "{depth}");
     let mut oracle = Oracle::new(&log).unwrap();
-    for prefetch in Prefetch::ALL {
-        let mut engine = engine(&file, u64::MAX, InUse::Yields, prefetch, store);
+    for (strategy, prefetch) in combinations() {
+        let mut engine = engine(&file, u64::MAX, InUse::Yields, (strategy, prefetch), store);
         let mut random = Random(31);
         let mut waits = 0;
-        for _ in 0..40 {
+        for _ in 0..20 {
             let mut view = random_view(&mut random);
             for _ in 0..random.below(12) {
                 random_step(&mut view, &mut random);
@@ -94,7 +93,10 @@ fn a_camera_that_stops_gets_its_cut_in_time() {
             waits += frames;
             let transfer = Duration::from_secs_f64(bytes as f64 / 2e6);
             let limit = 2 * (store.latency * depth + transfer);
-            assert!(FRAME * frames <= limit, "{}: {frames} frames, {limit:?} allowed", prefetch.name());
+            assert!(
+                FRAME * frames <= limit,
+                "{strategy:?}, {prefetch:?}: {frames} frames, {limit:?} allowed"
+            );
         }
         assert!(waits > 20, "{waits}: nothing was missing");
     }
@@ -113,7 +115,8 @@ fn a_camera_at_rest_comes_to_rest() {
             [(InUse::Yields, 4), (InUse::Yields, 30), (InUse::Stays, 8), (InUse::Stays, 30)]
         {
             let name = format!("{}, {in_use:?}, {holders} place holders", prefetch.name());
-            let mut engine = engine(&file, holders * holder_bytes(&file), in_use, prefetch, store);
+            let how = (Strategy::Event, prefetch);
+            let mut engine = engine(&file, holders * holder_bytes(&file), in_use, how, store);
             let mut random = Random(41);
             let (mut no_room, mut coarser) = (0, 0);
             for _ in 0..8 {
@@ -152,7 +155,8 @@ fn virtual_time_repeats_itself() {
     let store = Simulated { latency: Duration::from_millis(30), bandwidth: Some(500_000), depth: 4 };
     for prefetch in Prefetch::ALL {
         let replay = || {
-            let mut engine = engine(&file, 60 * holder_bytes(&file), InUse::Yields, prefetch, store);
+            let how = (Strategy::Event, prefetch);
+            let mut engine = engine(&file, 60 * holder_bytes(&file), InUse::Yields, how, store);
             let mut random = Random(51);
             let mut view = random_view(&mut random);
             let frames: Vec<_> = (0..300)

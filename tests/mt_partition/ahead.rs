@@ -5,12 +5,14 @@ use std::time::Duration;
 
 use foldfront::VertexTree;
 use foldfront::engine::{Engine, FrameReport, Settings};
+use foldfront::refine::Strategy;
 use foldfront::vertex_tree::simulated::Simulated;
 use foldfront::vertex_tree::{NodeId, NullSink, Prefetch};
 use foldfront::view::View;
 use glam::DVec3;
 use mt_partition::{BuildOptions, CacheMode, Memory, MtFile, MtTree, Reader};
 
+use crate::common::backends::combinations;
 use crate::common::graph_cut::{self, GraphCut};
 use crate::{CRITERION, ball_log};
 
@@ -39,7 +41,7 @@ fn orbit(frames: usize) -> Vec<View> {
 
 fn engine(
     file: &Arc<MtFile>,
-    prefetch: Prefetch,
+    (strategy, prefetch): (Strategy, Prefetch),
     memory: Memory,
     store: Simulated,
 ) -> Engine<MtTree, NullSink> {
@@ -50,7 +52,7 @@ fn engine(
         reader: Some(Reader::simulated(store)),
     };
     let tree = MtTree::new(file.clone(), settings).unwrap();
-    Engine::new(tree, NullSink, Settings { rho: 0.02, ..Settings::default() }).unwrap()
+    Engine::new(tree, NullSink, Settings { rho: 0.02, strategy, ..Settings::default() }).unwrap()
 }
 
 /// Frames as they come, each of the time of a frame.
@@ -127,7 +129,7 @@ fn replay(
 ) -> Totals {
     let prefetch = if future.is_some() { Prefetch::Schedule } else { Prefetch::None };
     let memory = Memory::new(memory);
-    let mut engine = engine(file, prefetch, memory.clone(), store);
+    let mut engine = engine(file, (Strategy::Event, prefetch), memory.clone(), store);
     // A viewer starts when everything is there.
     while engine.advance(&views[..1]).unwrap().misses > 0 {
         engine.tree_mut().settle().unwrap();
@@ -182,10 +184,10 @@ fn a_camera_that_stops_gets_its_cut() {
     let (latency, bandwidth) = (Duration::from_millis(40), 2_000_000);
     let store = Simulated { latency, bandwidth: Some(bandwidth), depth: 32 };
     let mut cut = GraphCut::new(&file);
-    for prefetch in Prefetch::ALL {
+    for (strategy, prefetch) in combinations() {
         // How many reads lead to one another, and what they bring: where nothing takes time.
         let no_time = Simulated::with_latency(Duration::ZERO);
-        let mut at_once = engine(&file, Prefetch::None, Memory::default(), no_time);
+        let mut at_once = engine(&file, (strategy, Prefetch::None), Memory::default(), no_time);
         let mut arrive = |view: &View| {
             let (mut depth, mut bytes) = (0, 0);
             loop {
@@ -203,7 +205,7 @@ fn a_camera_that_stops_gets_its_cut() {
         }
         let (depth, bytes) = arrive(&last);
         assert!(depth > 2, "{depth}");
-        let mut engine = engine(&file, prefetch, Memory::default(), store);
+        let mut engine = engine(&file, (strategy, prefetch), Memory::default(), store);
         for view in views {
             play(&mut engine, view);
         }
@@ -215,7 +217,7 @@ fn a_camera_that_stops_gets_its_cut() {
         assert_eq!(cut.difference(&engine), None);
         let most = 2.0 * (latency.as_secs_f64() * f64::from(depth) + bytes as f64 / bandwidth as f64);
         let took = f64::from(frames) * FRAME.as_secs_f64();
-        assert!(frames > 0 && took <= most, "{prefetch:?}: {took} s, at most {most}");
+        assert!(frames > 0 && took <= most, "{strategy:?}, {prefetch:?}: {took} s, at most {most}");
         for _ in 0..100 {
             let report = play(&mut engine, &last);
             assert_eq!((report.unfolds + report.folds, report.misses, report.pages.reads), (0, 0, 0));
@@ -235,7 +237,7 @@ fn little_memory_comes_to_rest() {
     for prefetch in Prefetch::ALL {
         for times in [1, 2] {
             let memory = Memory::new(times * file.least_memory());
-            let mut engine = engine(&file, prefetch, memory.clone(), store);
+            let mut engine = engine(&file, (Strategy::Event, prefetch), memory.clone(), store);
             for (frame, view) in views.iter().enumerate() {
                 future.tell(frame, &mut engine);
                 play(&mut engine, view);

@@ -16,8 +16,10 @@ use super::Pager;
 use crate::lists::Class;
 use crate::waiting::Command;
 
-/// Look this far ahead at least, and at most.
-const LEAST_AHEAD: u32 = 2;
+/// Look this far ahead at least, and at most. Two frames would do for a store of short latency, if it were never asked for more
+/// pages in a frame than it can read in one: where a car turns in a large city, the pages of several frames are fetched in
+/// the time before.
+const LEAST_AHEAD: u32 = 4;
 const MOST_AHEAD: u32 = 60;
 
 /// What is left of the longest time of a fetch after another: half after 69. Where nothing is fetched, nothing is
