@@ -67,6 +67,15 @@ pub struct BuildOptions {
     pub partition: Option<u32>,
 }
 
+impl From<&BuildOptions> for mt_partition::BuildOptions {
+    fn from(options: &BuildOptions) -> Self {
+        let mut build = Self::default();
+        build.patch = options.patch.unwrap_or(build.patch);
+        build.partition = options.partition.unwrap_or(build.partition);
+        build
+    }
+}
+
 /// A hierarchy could not be written, opened or verified.
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
@@ -152,10 +161,7 @@ pub fn write(
             detail_block::write(file, log, &build)?;
         }
         Backend::MtPartition => {
-            let mut build = mt_partition::BuildOptions::default();
-            build.patch = options.patch.unwrap_or(build.patch);
-            build.partition = options.partition.unwrap_or(build.partition);
-            mt_partition::write(file, log, &build)?;
+            mt_partition::write(file, log, &options.into())?;
         }
     }
     Ok(())
@@ -173,17 +179,16 @@ pub struct WriteLimits<'a> {
 }
 
 impl WriteLimits<'_> {
-    /// Fails if a backend's file can not be written for a mesh of so many vertices and triangles: detail blocks and
-    /// multi-triangulations need the log and what they make of it in memory.
+    /// Fails if a backend's file can not be written for a mesh of so many vertices and triangles: detail blocks need the
+    /// log and what they make of it in memory.
     ///
     /// # Errors
     /// [`StoreError::Memory`].
     pub fn check(&self, backend: Backend, vertices: u64, triangles: u64) -> Result<(), StoreError> {
         let [a_vertex, a_triangle] = match backend {
-            Backend::InMemory | Backend::MetaNode => [0, 0],
+            Backend::InMemory | Backend::MetaNode | Backend::MtPartition => [0, 0],
             // Log and forest: 56 and 12 bytes. What comes to that is what each crate says of itself.
             Backend::DetailBlock => [56 + 100, 12 + 60],
-            Backend::MtPartition => [56, 12 + 200],
         };
         let needed = vertices * a_vertex + triangles * a_triangle;
         if needed > self.memory {
@@ -218,7 +223,12 @@ pub fn write_within(
                 meta_node::Workspace { folder: limits.temporary.clone(), memory, stop: limits.stop };
             meta_node::write_within(file, log, &options, &workspace)?;
         }
-        Backend::DetailBlock | Backend::MtPartition => {
+        Backend::MtPartition => {
+            let (memory, folder) = (limits.memory, limits.temporary.clone());
+            let workspace = mt_partition::Workspace { folder, memory, stop: limits.stop };
+            mt_partition::write_within(file, log, &options.into(), &workspace)?;
+        }
+        Backend::DetailBlock => {
             write(backend, file, &read_log(log.path())?, options)?;
         }
     }
