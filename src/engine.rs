@@ -18,7 +18,7 @@ use self::changes::{Counts, Noted, Pending, Steps, Urgent};
 use crate::budget::{Budget, Steering, WorkCap};
 use crate::criterion::Criterion;
 use crate::foresight::{Foresight, Watched};
-use crate::front::Front;
+use crate::front::{Front, Slot};
 use crate::motion::{Odometer, Speed};
 use crate::normal_cone::Cones;
 use crate::queue::Kind;
@@ -175,6 +175,7 @@ pub struct Engine<T, M> {
     still_needed: Vec<Noted>,
     folding: Vec<Noted>,
     unfolding: Vec<Noted>,
+    ready: Vec<Slot>,
     urgent: [BinaryHeap<Urgent>; 2],
     arrived: Vec<NodeId>,
     drawing_time: Duration,
@@ -221,6 +222,7 @@ impl<T: VertexTree, M: MeshSink> Engine<T, M> {
             still_needed: Vec::new(),
             folding: Vec::new(),
             unfolding: Vec::new(),
+            ready: Vec::new(),
             urgent: Default::default(),
             arrived: Vec::new(),
             drawing_time: Duration::ZERO,
@@ -339,6 +341,7 @@ impl<T: VertexTree, M: MeshSink> Engine<T, M> {
                 still_needed: &mut self.still_needed,
                 folding: &mut self.folding,
                 unfolding: &mut self.unfolding,
+                ready: &mut self.ready,
                 counts: Counts::default(),
                 tests: 0,
             };

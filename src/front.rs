@@ -9,6 +9,8 @@
 //! A node in play is known by the [`Slot`] of its record. The engine, the strategies and the event queue index their own
 //! arrays by it too, so all of them are as large as the front.
 
+mod graph;
+
 use slab::Slab;
 use vertex_tree::{Bounds, NONE, NodeId, VertexTree, prefetch};
 
@@ -95,11 +97,15 @@ pub struct Front {
     free: Vec<u32>,
     /// Pairs of the children of nodes that have more than two, as they do in a multi-triangulation.
     many: Slab<Vec<u32>>,
+    /// Lists of such pairs that are not in use, for their allocations.
+    spare: Vec<Vec<u32>>,
     /// The pairs of the roots, and where each root is, in order of nodes.
     roots: Vec<u32>,
     root_slots: Vec<(NodeId, Slot)>,
     /// For each node in play, its slot. Kept only for graphs: in a tree, what is linked says it all.
     slots: Vec<Slot>,
+    /// A bit for each node that is active. Kept only for graphs.
+    active_bits: Vec<u64>,
     active: usize,
     hash: u64,
 }
@@ -112,9 +118,15 @@ impl Front {
             above: vec![Slot::NONE],
             free: Vec::new(),
             many: Slab::new(),
+            spare: Vec::new(),
             roots: Vec::new(),
             root_slots: Vec::new(),
             slots: if T::IS_TREE { Vec::new() } else { vec![Slot::NONE; tree.node_limit() as usize] },
+            active_bits: if T::IS_TREE {
+                Vec::new()
+            } else {
+                vec![0; tree.node_limit().div_ceil(64) as usize]
+            },
             active: 0,
             hash: 0,
         };
@@ -317,14 +329,11 @@ impl Front {
         self.free.push(pair);
     }
 
-    /// Records that a boundary node has been unfolded, and that its children come into play.
+    /// Records that a boundary node of a tree has been unfolded, and that its children come into play.
     #[inline(always)]
     pub(crate) fn set_active<T: VertexTree>(&mut self, tree: &T, slot: Slot) {
         let node = self.node(slot);
-        // Each child is linked below its first parent alone: a spanning tree, where the structure is a graph.
-        let mut linked = tree
-            .children_and_bounds(node)
-            .filter(|&(child, _)| T::IS_TREE || tree.parents(child).next() == Some(node));
+        let mut linked = tree.children_and_bounds(node);
         let mut status = ACTIVE;
         let mut children = match linked.next() {
             None => 0,
@@ -342,27 +351,15 @@ impl Front {
             children = self.many.insert(pairs) as u32 + 1;
         }
         drop(linked);
-        if !T::IS_TREE {
-            for child in tree.children(node) {
-                let child_slot = self.slots[child.index()];
-                if tree.parents(child).next() == Some(node) {
-                    let waits_for =
-                        |p: &NodeId| *p != node && !self.record(self.slots[p.index()]).is_active();
-                    self.record_mut(child_slot).status = tree.parents(child).filter(waits_for).count() as u32;
-                } else if child_slot != Slot::NONE {
-                    self.record_mut(child_slot).status -= 1;
-                }
-            }
-        }
         let record = self.record_mut(slot);
         record.status = status;
         record.children = children;
-        self.count_at_parents(tree, slot, 1);
+        self.count_at_parent(slot, 1);
         self.active += 1;
         self.hash = self.hash.wrapping_add(mix(tree.log_number(node)));
     }
 
-    /// Records that a collapsible node has been folded.
+    /// Records that a collapsible node of a tree has been folded.
     #[inline(always)]
     pub(crate) fn set_folded<T: VertexTree>(&mut self, tree: &T, slot: Slot) {
         let record = self.record_mut(slot);
@@ -376,34 +373,18 @@ impl Front {
         } else if children != 0 {
             self.remove_pair(children);
         }
-        if !T::IS_TREE {
-            // What is still in play is linked below another parent, and waits for this one again.
-            for child in tree.children(node) {
-                let child = self.slots[child.index()];
-                if child != Slot::NONE {
-                    self.record_mut(child).status += 1;
-                }
-            }
-        }
-        self.count_at_parents(tree, slot, -1);
+        self.count_at_parent(slot, -1);
         self.active -= 1;
         self.hash = self.hash.wrapping_sub(mix(tree.log_number(node)));
     }
 
     /// An active child more, or one less.
     #[inline(always)]
-    fn count_at_parents<T: VertexTree>(&mut self, tree: &T, slot: Slot, change: i32) {
-        if T::IS_TREE {
-            let above = self.above[slot.pair()];
-            if above != Slot::NONE {
-                let record = self.record_mut(above);
-                record.status = record.status.wrapping_add_signed(change);
-            }
-        } else {
-            for parent in tree.parents(self.node(slot)) {
-                let record = self.record_mut(self.slots[parent.index()]);
-                record.status = record.status.wrapping_add_signed(change);
-            }
+    fn count_at_parent(&mut self, slot: Slot, change: i32) {
+        let above = self.above[slot.pair()];
+        if above != Slot::NONE {
+            let record = self.record_mut(above);
+            record.status = record.status.wrapping_add_signed(change);
         }
     }
 

@@ -270,6 +270,13 @@ impl EventQueue {
         prefetch(&self.tickets, slot.index());
     }
 
+    /// Whether something has come up.
+    #[inline]
+    #[must_use]
+    pub fn is_ripe(&self) -> bool {
+        !self.ripe.is_empty()
+    }
+
     /// Lets the pressing events come up.
     pub fn take_pressing(&mut self) {
         let pressing = std::mem::take(&mut self.pressing);
@@ -287,7 +294,7 @@ impl EventQueue {
     /// Whether no event waits on a clock.
     #[must_use]
     pub fn is_idle(&self, clock: usize) -> bool {
-        self.wheels[clock].occupied == [0; LEVELS]
+        self.wheels[clock].is_empty()
     }
 
     /// Calls `f` with every event that an advance of a clock to `now` would let come up.

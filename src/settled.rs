@@ -62,6 +62,12 @@ impl<T: VertexTree> VertexTree for Settled<T> {
     fn children_and_bounds(&self, node: NodeId) -> impl Iterator<Item = (NodeId, Bounds)> {
         self.tree.children_and_bounds(node)
     }
+    fn children_and_parents(
+        &self,
+        node: NodeId,
+    ) -> impl Iterator<Item = (NodeId, Bounds, impl Iterator<Item = NodeId>)> {
+        self.tree.children_and_parents(node)
+    }
     fn normal_cone(&self, node: NodeId) -> NormalCone {
         self.tree.normal_cone(node)
     }

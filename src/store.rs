@@ -67,6 +67,15 @@ pub struct BuildOptions {
     pub partition: Option<u32>,
 }
 
+impl From<&BuildOptions> for mt_partition::BuildOptions {
+    fn from(options: &BuildOptions) -> Self {
+        let mut build = Self::default();
+        build.patch = options.patch.unwrap_or(build.patch);
+        build.partition = options.partition.unwrap_or(build.partition);
+        build
+    }
+}
+
 /// A hierarchy could not be written, opened or verified.
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
@@ -84,21 +93,6 @@ pub enum StoreError {
     Foreign {
         /// The file.
         file: PathBuf,
-    },
-    /// A backend's file can only be written from a log that is in memory, and there is not enough.
-    #[error(
-        "files of {} are written from memory: about {} MB are needed for {triangles} triangles, {} MB are allowed",
-        backend.name(), needed >> 20, given >> 20
-    )]
-    Memory {
-        /// The backend.
-        backend: Backend,
-        /// Bytes, as estimated.
-        needed: u64,
-        /// Bytes.
-        given: u64,
-        /// Of the input.
-        triangles: u64,
     },
     /// There is not as much room for temporary files as will be needed.
     #[error(
@@ -167,10 +161,7 @@ pub fn write(
             detail_block::write(file, log, &build)?;
         }
         Backend::MtPartition => {
-            let mut build = mt_partition::BuildOptions::default();
-            build.patch = options.patch.unwrap_or(build.patch);
-            build.partition = options.partition.unwrap_or(build.partition);
-            mt_partition::write(file, log, &build)?;
+            mt_partition::write(file, log, &options.into())?;
         }
     }
     Ok(())
@@ -185,26 +176,6 @@ pub struct WriteLimits<'a> {
     pub temporary: PathBuf,
     /// Set by whoever wants it to end.
     pub stop: &'a AtomicBool,
-}
-
-impl WriteLimits<'_> {
-    /// Fails if a backend's file can not be written for a mesh of so many vertices and triangles:
-    /// multi-triangulations need the log and what they make of it in memory.
-    ///
-    /// # Errors
-    /// [`StoreError::Memory`].
-    pub fn check(&self, backend: Backend, vertices: u64, triangles: u64) -> Result<(), StoreError> {
-        let [a_vertex, a_triangle] = match backend {
-            Backend::InMemory | Backend::MetaNode | Backend::DetailBlock => [0, 0],
-            // Log and forest: 56 and 12 bytes. What comes to that is what the crate says of itself.
-            Backend::MtPartition => [56, 12 + 200],
-        };
-        let needed = vertices * a_vertex + triangles * a_triangle;
-        if needed > self.memory {
-            return Err(StoreError::Memory { backend, needed, given: self.memory, triangles });
-        }
-        Ok(())
-    }
 }
 
 impl WriteLimits<'_> {
@@ -223,7 +194,7 @@ impl WriteLimits<'_> {
 /// Writes a log that is in a file as the file of a backend, whole or not at all, within limits.
 ///
 /// # Errors
-/// [`StoreError::Memory`], and what the backend says.
+/// [`StoreError::Room`], and what the backend says.
 pub fn write_within(
     backend: Backend,
     file: &Path,
@@ -232,7 +203,6 @@ pub fn write_within(
     limits: &WriteLimits<'_>,
 ) -> Result<(), StoreError> {
     let counts = log.counts();
-    limits.check(backend, counts.vertices, counts.triangles)?;
     match backend {
         Backend::InMemory => {
             write_log_from(file, counts, log.positions(), log.triangles(), log.collapses())?;
@@ -260,7 +230,9 @@ pub fn write_within(
             detail_block::write_within(file, log, &build, &workspace)?;
         }
         Backend::MtPartition => {
-            write(backend, file, &read_log(log.path())?, options)?;
+            let (memory, folder) = (limits.memory, limits.temporary.clone());
+            let workspace = mt_partition::Workspace { folder, memory, stop: limits.stop };
+            mt_partition::write_within(file, log, &options.into(), &workspace)?;
         }
     }
     Ok(())

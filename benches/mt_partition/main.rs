@@ -8,12 +8,15 @@
 //!   along a path, against the in-memory tree, whose nodes are single collapses.
 //! * `figures`: the paper's figures 4 and 5: the sum of read operations and the memory over the frames, for an object that
 //!   comes near and one that turns, for all four cache modes and both orders of the partitioning queue.
-//! * `selection`: what finding the changes takes, by displayed triangle, everything in memory, against the in-memory tree.
+//! * `within`: what files are like that are written with less memory than the graph takes.
+//! * `selection`: what finding the changes takes, by displayed triangle, everything in memory and paging, against the in-memory
+//!   tree and meta-nodes.
 //!
 //! Frames are settled: each waits for its pages, and its cut is compared between modes; another cut fails the benchmark.
 
 mod figures;
 mod selection;
+mod within;
 
 use std::path::PathBuf;
 use std::sync::Arc;
@@ -32,7 +35,7 @@ use mt_partition::{BuildOptions, CacheMode, MtFile, MtTree, WriteReport};
 
 fn main() {
     let words: Vec<String> = std::env::args().skip(1).filter(|a| !a.starts_with("--")).collect();
-    let experiments = ["reduction", "figures", "selection"];
+    let experiments = ["reduction", "figures", "within", "selection"];
     let models = ["armadillo_100k", "dragon", "happy"];
     let is_chosen = |name: &&&str, among: &[&str]| {
         let is_named = |name: &str| words.iter().any(|word| name.contains(word.as_str()));
@@ -45,6 +48,7 @@ fn main() {
             match experiment {
                 "reduction" => reduction(&log),
                 "figures" => figures::figures(model, &log),
+                "within" => within::within(&folder(), &log),
                 _ => selection::selection(&log),
             }
         }

@@ -31,7 +31,7 @@ pub fn selection(log: &CollapseLog) {
         views.truncate(FRAMES);
         for strategy in [Strategy::TopDown, Strategy::Front, Strategy::Event] {
             let settings = settings(&path, strategy);
-            let mut figures = [const { Vec::new() }; 3];
+            let mut figures = [const { Vec::new() }; 4];
             for _ in 0..ROUNDS {
                 let plain = InMemoryTree::new(hierarchy.clone());
                 least(&mut figures[0], &views, Engine::new(plain, NullSink, settings).expect("in memory"));
@@ -43,20 +43,27 @@ pub fn selection(log: &CollapseLog) {
                 let mut groups = tree(&file, CacheMode::PCc);
                 groups.load_all();
                 groups.settle().expect("a whole file");
-                least(
-                    &mut figures[2],
-                    &views,
-                    Engine::new(groups, NullSink, settings).expect("a whole file"),
-                );
+                for (trees, figures) in
+                    [groups, tree(&file, CacheMode::PCc)].into_iter().zip(&mut figures[2..])
+                {
+                    least(figures, &views, Engine::new(trees, NullSink, settings).expect("a whole file"));
+                }
             }
-            let [plain, meta, groups] = figures.map(|frames| Figures::new(&frames));
+            let [plain, meta, groups, paging] = figures.map(|frames| Figures::new(&frames));
             println!("{}, {}:", path.name, strategy.name());
-            for (name, f) in [("in-memory", &plain), ("meta-node", &meta), ("mt-partition", &groups)] {
+            let all = [
+                ("in-memory", &plain),
+                ("meta-node", &meta),
+                ("mt-partition", &groups),
+                ("mt-partition, p-cc", &paging),
+            ];
+            for (name, f) in all {
                 println!(
-                    "  {name:12}: {:.3} ns a triangle displayed, {:.2} us a frame, {:.0} triangles, {:.0} tests, {:.1} changes; \
-                     meta-node : this, {:.2} by triangle, {:.2} by frame",
+                    "  {name:18}: {:.3} ns a triangle displayed, {:.2} us a frame, {:.2} us one without changes, {:.0} \
+                     triangles, {:.0} tests, {:.2} changes; meta-node : this, {:.2} by triangle, {:.2} by frame",
                     f.ns / f.triangles,
                     f.ns / 1e3,
+                    f.idle_ns / 1e3,
                     f.triangles,
                     f.tests,
                     f.changes,
@@ -90,6 +97,8 @@ fn meta_nodes(log: &CollapseLog) -> Arc<MetaNodeFile> {
 /// Means over the frames.
 struct Figures {
     ns: f64,
+    /// Over those without changes.
+    idle_ns: f64,
     triangles: f64,
     tests: f64,
     changes: f64,
@@ -101,7 +110,12 @@ impl Figures {
         let frames = &frames[1..];
         let mean =
             |f: &dyn Fn(&FrameReport) -> u64| frames.iter().map(f).sum::<u64>() as f64 / frames.len() as f64;
+        let (idle, count) = frames
+            .iter()
+            .filter(|r| r.unfolds + r.folds == 0)
+            .fold((0.0, 0_u32), |(sum, count), r| (sum + r.select.as_nanos() as f64, count + 1));
         Self {
+            idle_ns: idle / f64::from(count.max(1)),
             ns: mean(&|r| r.select.as_nanos() as u64),
             triangles: mean(&|r| r.triangles),
             tests: mean(&|r| r.tests),

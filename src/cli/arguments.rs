@@ -61,7 +61,8 @@ pub(super) struct Build {
     pub merge_components: bool,
     #[command(flatten)]
     pub storage: Storage,
-    /// Memory to build within, such as 256M, for meshes that are larger; the rest is kept in temporary files.
+    /// Memory to build within, such as 256M, for meshes that are larger; the rest is kept in temporary files. The result is
+    /// the same, but for mt-partition, whose merges are made in another order where the graph does not fit.
     #[arg(long, value_name = "SIZE", value_parser = size)]
     pub memory: Option<u64>,
     /// Threads that share this memory, 1 to 4; the result does not depend on it [default: one a core].

@@ -73,8 +73,6 @@ fn write_within(name: &str, log: &LogFile, command: &Build, limits: &WriteLimits
 fn build_within(name: &str, files: &[PathBuf], memory: u64, command: &Build) -> Result<simplify::Report> {
     let limits = write_limits(memory, command)?;
     let expected_triangles = mesh_io::expected_triangles(files);
-    // Where that is not known, it will be seen. Meshes have half as many vertices as triangles.
-    limits.check(command.backend, expected_triangles / 2, expected_triangles)?;
     let folder = &limits.temporary;
     let options = simplify::Options { merge_components: command.merge_components };
     let cores = || std::thread::available_parallelism().map_or(1, usize::from).min(simplify::MOST_THREADS);

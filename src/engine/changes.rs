@@ -82,6 +82,8 @@ pub(super) struct Steps<'a, T, M, F> {
     /// so that its memory is fetched with that of others too.
     pub folding: &'a mut Vec<Noted>,
     pub unfolding: &'a mut Vec<Noted>,
+    /// What the change under way has made boundary nodes or collapsible, where nodes have several parents.
+    pub ready: &'a mut Vec<Slot>,
     pub counts: Counts,
     pub tests: u64,
 }
@@ -309,25 +311,45 @@ impl<T: VertexTree, M: MeshSink, F: Watch> Steps<'_, T, M, F> {
                 return Ok(());
             }
         }
-        self.counts.folds += 1;
-        for child in self.front.children(self.tree, slot) {
-            self.finder.unwatch(child);
-        }
-        self.finder.unwatch(slot);
-        self.front.set_folded(self.tree, slot);
-        self.watch(slot, Kind::Unfold);
-        for parent in self.front.parents(self.tree, slot) {
-            let record = self.front.record(parent);
-            if record.is_collapsible() {
-                self.tests += 1;
-                if self.frame.unfold(parent, &record.bounds) {
-                    self.finder.watch(self.frame, parent, Kind::Fold, record.bounds);
-                } else {
-                    self.folding.push((parent, record.node));
-                }
-            }
-        }
+        self.folded(slot);
         Ok(())
+    }
+
+    /// The backend has folded a node.
+    #[inline(always)]
+    fn folded(&mut self, slot: Slot) {
+        self.counts.folds += 1;
+        if T::IS_TREE {
+            for child in self.front.children(self.tree, slot) {
+                self.finder.unwatch(child);
+            }
+            self.finder.unwatch(slot);
+            self.front.set_folded(self.tree, slot);
+        } else {
+            self.finder.unwatch(slot);
+            self.ready.clear();
+            let finder = &mut *self.finder;
+            self.front.set_folded_in_graph(self.tree, slot, |child| finder.unwatch(child), self.ready);
+        }
+        self.watch(slot, Kind::Unfold);
+        let (front, frame) = (&*self.front, self.frame);
+        let mut comes_into_play = |slot: Slot| {
+            let record = front.record(slot);
+            self.tests += 1;
+            if frame.unfold(slot, &record.bounds) {
+                self.finder.watch(frame, slot, Kind::Fold, record.bounds);
+            } else {
+                self.folding.push((slot, record.node));
+            }
+        };
+        if T::IS_TREE {
+            front
+                .parents(self.tree, slot)
+                .filter(|&parent| front.record(parent).is_collapsible())
+                .for_each(comes_into_play);
+        } else {
+            self.ready.iter().for_each(|&parent| comes_into_play(parent));
+        }
     }
 
     /// Unfolds a boundary node that some view wants, and before it what the backend says it needs. Children that are
@@ -405,12 +427,18 @@ impl<T: VertexTree, M: MeshSink, F: Watch> Steps<'_, T, M, F> {
     fn unfolded(&mut self, slot: Slot) {
         self.counts.unfolds += 1;
         self.finder.unwatch(slot);
-        for parent in self.front.parents(self.tree, slot) {
-            if self.front.record(parent).is_collapsible() {
-                self.finder.unwatch(parent);
+        if T::IS_TREE {
+            for parent in self.front.parents(self.tree, slot) {
+                if self.front.record(parent).is_collapsible() {
+                    self.finder.unwatch(parent);
+                }
             }
+            self.front.set_active(self.tree, slot);
+        } else {
+            self.ready.clear();
+            let finder = &mut *self.finder;
+            self.front.set_active_in_graph(self.tree, slot, |parent| finder.unwatch(parent), self.ready);
         }
-        self.front.set_active(self.tree, slot);
         if let Some(cones) = self.frame.cones {
             for child in self.front.children(self.tree, slot) {
                 cones.set(child, self.tree.normal_cone(self.front.node(child)));
@@ -436,11 +464,14 @@ impl<T: VertexTree, M: MeshSink, F: Watch> Steps<'_, T, M, F> {
             comes_into_play(children[1], b, wanted[1]);
             return;
         }
-        for child in front.children(self.tree, slot) {
+        let mut test = |child: Slot| {
             let record = front.record(child);
-            if T::IS_TREE || record.is_boundary() {
-                comes_into_play(child, record, frame.unfold(child, &record.bounds));
-            }
+            comes_into_play(child, record, frame.unfold(child, &record.bounds));
+        };
+        if T::IS_TREE {
+            front.children(self.tree, slot).for_each(test);
+        } else {
+            self.ready.iter().for_each(|&child| test(child));
         }
     }
 

@@ -15,14 +15,24 @@ pub(super) struct Wheel {
     /// `levels[l][s]` has the events whose deadline tick, divided by `2^l`, is `s` modulo 16.
     pub levels: [[Bucket; SLOTS as usize]; LEVELS],
     /// For each level, a bit for each slot that may hold events.
-    pub occupied: [u16; LEVELS],
+    occupied: [u16; LEVELS],
+    /// A bit for each level that has such slots.
+    in_use: u32,
+    /// No such slot starts before this tick, so that a clock that does not get there costs a comparison.
+    next: u64,
     /// The tick that the clock is in.
     tick: u64,
 }
 
 impl Wheel {
     pub fn new() -> Self {
-        Self { levels: [[0; SLOTS as usize]; LEVELS], occupied: [0; LEVELS], tick: 0 }
+        let levels = [[0; SLOTS as usize]; LEVELS];
+        Self { levels, occupied: [0; LEVELS], in_use: 0, next: u64::MAX, tick: 0 }
+    }
+
+    /// Whether it holds no events.
+    pub fn is_empty(&self) -> bool {
+        self.in_use == 0
     }
 
     /// Puts an event where it comes up before the clock is more than `ahead` ticks further.
@@ -34,7 +44,10 @@ impl Wheel {
         let level = (32 - ahead.leading_zeros()).saturating_sub(4);
         let straddles = (deadline >> level) - (self.tick >> level) >= SLOTS;
         let level = level + u32::from(straddles);
-        let slot = (deadline >> level) as u32 % SLOTS as u32;
+        let number = deadline >> level;
+        self.next = self.next.min(number << level);
+        self.in_use |= 1 << level;
+        let slot = number as u32 % SLOTS as u32;
         // Never more than there are, which spares a panic.
         let level = level as usize % LEVELS;
         self.occupied[level] |= 1 << slot;
@@ -47,41 +60,54 @@ impl Wheel {
         let after = (now * TICKS_PER_FRAME) as u64;
         debug_assert!(after >= before, "the clock went back from tick {before} to {after}");
         self.tick = after;
-        for level in 0..LEVELS {
+        if after < self.next {
+            return;
+        }
+        self.next = u64::MAX;
+        for level in bits(self.in_use) {
             let (first, last) = (before >> level, after >> level);
             // The slot of the present tick is drained every time, that of a wider level once, when it is reached.
             let first = if level == 0 { first } else { first + 1 };
-            if first > last {
-                // Wider levels have not moved either.
-                break;
+            if first <= last {
+                // The slots from `first` to `last`, round the ring.
+                let count = (last - first + 1).min(SLOTS);
+                let reached = (((1_u32 << count) - 1) as u16).rotate_left((first % SLOTS) as u32);
+                self.take(level, reached, ripe);
             }
-            // The slots from `first` to `last`, round the ring.
-            let count = (last - first + 1).min(SLOTS);
-            let reached = (((1_u32 << count) - 1) as u16).rotate_left((first % SLOTS) as u32);
-            self.take(level, reached, ripe);
+            if self.occupied[level] != 0 {
+                // What is left lies after the present slot, once round at most.
+                let ahead = self.occupied[level].rotate_right(((last + 1) % SLOTS) as u32).trailing_zeros();
+                self.next = self.next.min((last + 1 + u64::from(ahead)) << level);
+            }
         }
     }
 
     pub fn take_all(&mut self, ripe: &mut Vec<Bucket>) {
-        for level in 0..LEVELS {
+        for level in bits(self.in_use) {
             self.take(level, u16::MAX, ripe);
         }
+        self.next = u64::MAX;
     }
 
     /// The buckets that an advance to `now` would reach.
     pub fn due_within(&self, now: f64) -> impl Iterator<Item = Bucket> + '_ {
         let last = (now * TICKS_PER_FRAME) as u64;
-        self.levels.iter().zip(0..).flat_map(move |(slots, level)| {
+        let levels = bits(if last < self.next { 0 } else { self.in_use });
+        levels.flat_map(move |level| {
             // The present slot of a wider level has been drained.
             let (first, last) = ((self.tick >> level) + u64::from(level > 0), last >> level);
+            let slots = &self.levels[level];
             (first..=last.min(first + SLOTS - 1)).map(move |slot| slots[(slot % SLOTS) as usize])
         })
     }
 
     /// Moves the buckets in some slots of a level, one bit each.
-    pub fn take(&mut self, level: usize, slots: u16, ripe: &mut Vec<Bucket>) {
+    fn take(&mut self, level: usize, slots: u16, ripe: &mut Vec<Bucket>) {
         let mut slots = slots & self.occupied[level];
         self.occupied[level] &= !slots;
+        if self.occupied[level] == 0 {
+            self.in_use &= !(1 << level);
+        }
         while slots != 0 {
             let bucket = std::mem::take(&mut self.levels[level][slots.trailing_zeros() as usize]);
             // Nothing may be left in it but its bit.
@@ -91,4 +117,13 @@ impl Wheel {
             slots &= slots - 1;
         }
     }
+}
+
+/// The bits that are set, the lowest first.
+fn bits(mut mask: u32) -> impl Iterator<Item = usize> {
+    std::iter::from_fn(move || {
+        let bit = mask.trailing_zeros();
+        mask &= mask.wrapping_sub(1);
+        (bit < u32::BITS).then_some(bit as usize)
+    })
 }

@@ -54,6 +54,8 @@ pub(crate) struct EventDriven {
     strayed: f64,
     /// Nodes watched since the last frame's events were scheduled.
     fresh: Vec<Event>,
+    /// Room for what is tested.
+    batches: [Batch; 2],
 }
 
 #[derive(Clone, Copy)]
@@ -74,6 +76,7 @@ impl EventDriven {
             drift: DVec3::ZERO,
             strayed: 0.0,
             fresh: Vec::new(),
+            batches: [const { Batch::EMPTY }; 2],
         }
     }
 
@@ -84,6 +87,9 @@ impl EventDriven {
             Motion::Rest => self.queue.take_pressing(),
             Motion::Frames(_) => self.advance(frame, before),
             Motion::Unbounded => self.queue.take_all(),
+        }
+        if !self.queue.is_ripe() {
+            return;
         }
         let Flips { unfold, fold, tests } = flips;
         let next = |queue: &mut EventQueue, due: &mut [Event; LANES]| {
@@ -164,6 +170,9 @@ impl EventDriven {
 
     /// Schedules the nodes that have come to be watched in this frame.
     pub fn settle(&mut self, frame: &Frame) {
+        if self.fresh.is_empty() {
+            return;
+        }
         let mut fresh = std::mem::take(&mut self.fresh);
         let mut left = fresh.iter();
         let next = |queue: &mut EventQueue, due: &mut [Event; LANES]| {
@@ -192,7 +201,9 @@ impl EventDriven {
     ) {
         let bench = Bench { frame, course: self.clocks[self.clock].course, clock: self.clock };
         match Lenses::new(frame.criterion, frame.views) {
-            Some(lenses) => process(&mut self.queue, lenses.as_slice(), &bench, next, flip),
+            Some(lenses) => {
+                process(&mut self.queue, lenses.as_slice(), &bench, &mut self.batches, next, flip);
+            }
             None => process_plainly(&mut self.queue, &bench, next, flip),
         }
     }
@@ -285,7 +296,8 @@ impl Batch {
     #[inline(always)]
     fn fill(&mut self, count: usize) {
         self.count = count;
-        for (lane, event) in self.events.iter().enumerate() {
+        // What is left in the other lanes is tested too, and nobody asks for the outcome.
+        for (lane, event) in self.events[..count].iter().enumerate() {
             self.block.set(lane, &event.bounds, event.tag());
         }
     }
@@ -296,12 +308,12 @@ fn process(
     queue: &mut EventQueue,
     lenses: &[Lens],
     bench: &Bench,
+    batches: &mut [Batch; 2],
     mut next: impl FnMut(&mut EventQueue, &mut [Event; LANES]) -> usize,
     mut flip: impl FnMut(&Event, &mut OnClock),
 ) {
     let rates = Rates::new(&bench.course);
-    let mut batches = [const { Batch::EMPTY }; 2];
-    let [batch, following] = &mut batches;
+    let [batch, following] = batches;
     let (mut batch, mut following) = (batch, following);
     let count = next(queue, &mut batch.events);
     batch.fill(count);

@@ -6,6 +6,7 @@ mod common;
 mod damage;
 mod paging;
 mod surface;
+mod within;
 
 use std::sync::Arc;
 

@@ -32,7 +32,7 @@ fn input(mesh: &Mesh) -> Vec<[u32; 3]> {
     canonical(mesh.triangles.iter().copied().filter(is_shown))
 }
 
-fn assert_finest_is_input(file: &Arc<MtFile>, mesh: &Mesh) {
+pub fn assert_finest_is_input(file: &Arc<MtFile>, mesh: &Mesh) {
     let mut engine = finest(file, StrictMesh::default());
     let (lo, hi) = mesh.bounding_box().unwrap_or_default();
     let center: [f64; 3] = std::array::from_fn(|i| f64::from(lo[i] + hi[i]) / 2.0);
@@ -54,6 +54,14 @@ fn boundary(triangles: &[[u32; 3]]) -> HashMap<[u32; 2], i32> {
     }
     edges.retain(|_, sum| *sum != 0);
     edges
+}
+
+/// What is displayed is a surface without a boundary; returns how many triangles it has.
+pub fn assert_closed(engine: &Engine<MtTree, StrictMesh>, when: &str) -> usize {
+    let triangles = displayed(engine);
+    assert_eq!(boundary(&triangles), HashMap::new(), "{when}");
+    assert_eq!(crowded(&triangles), 0, "{when}");
+    triangles.len()
 }
 
 /// Edges of more than two triangles.
@@ -87,11 +95,9 @@ fn every_cut_of_a_closed_surface_is_closed() {
             let report = engine.advance(&walk.step()).unwrap();
             // Frames with misses are as good as others.
             engine.tree_mut().settle().unwrap();
-            let triangles = displayed(&engine);
-            assert_eq!(boundary(&triangles), HashMap::new(), "patch {patch}, frame {frame}");
-            assert_eq!(crowded(&triangles), 0, "patch {patch}, frame {frame}");
-            assert_eq!(report.triangles, triangles.len() as u64);
-            sizes.push(triangles.len());
+            let triangles = assert_closed(&engine, &format!("patch {patch}, frame {frame}"));
+            assert_eq!(report.triangles, triangles as u64);
+            sizes.push(triangles);
         }
         sizes.sort_unstable();
         sizes.dedup();

@@ -1,6 +1,7 @@
 //! What can go wrong with a file.
 
 use std::io;
+use std::path::PathBuf;
 
 use vertex_tree::LogError;
 
@@ -88,6 +89,17 @@ pub enum MtError {
         /// The other node.
         other: u32,
     },
+    /// A temporary file can not be written or read.
+    #[error("temporary files in {}: {source}", folder.display())]
+    Temporary {
+        /// Where they are made.
+        folder: PathBuf,
+        /// Why.
+        source: io::Error,
+    },
+    /// Somebody wanted it to end.
+    #[error("interrupted")]
+    Interrupted,
     /// The collapse log does not fit its mesh.
     #[error(transparent)]
     Log(#[from] LogError),

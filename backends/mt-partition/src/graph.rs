@@ -2,8 +2,6 @@
 
 use vertex_tree::NONE;
 
-use crate::versions::Versions;
-
 /// One end of an arc: the node at the other end, and how many triangles lie on the arc. None lie on an arc that is a
 /// dependency and nothing else.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -12,7 +10,7 @@ pub(crate) struct Arc {
     pub triangles: u32,
 }
 
-/// Nodes are collapses, numbered as in the log. Arcs lead from a later collapse to an earlier one, from coarse to fine.
+/// Nodes are numbered in the order of the log. Arcs lead from a later collapse to an earlier one, from coarse to fine.
 #[derive(Clone, Debug, Default)]
 pub(crate) struct Graph {
     pub parents: Vec<Vec<Arc>>,
@@ -21,61 +19,31 @@ pub(crate) struct Graph {
     pub from_source: Vec<u32>,
     /// Triangles on the arc to the drain, which holds the input.
     pub to_drain: Vec<u32>,
-    /// Triangles on the arc from the source to the drain.
-    pub untouched: u32,
 }
 
 impl Graph {
-    pub fn new(nodes: usize, versions: &Versions) -> Self {
+    /// A graph with the given arcs, in ascending order: node above, node below, triangles. [`NONE`] is the source above and
+    /// the drain below. In the lists of the nodes those without triangles come last.
+    pub fn of_arcs(nodes: usize, arcs: &[[u32; 3]]) -> Self {
         let mut graph = Self {
             parents: vec![Vec::new(); nodes],
             children: vec![Vec::new(); nodes],
             from_source: vec![0; nodes],
             to_drain: vec![0; nodes],
-            untouched: 0,
         };
-        let key = |above: u32, below: u32| u64::from(above) << 32 | u64::from(below);
-        let mut arcs: Vec<u64> = Vec::with_capacity(versions.triangles.len() + versions.bare.len());
-        for t in &versions.triangles {
-            match (t.above, t.below) {
-                (NONE, NONE) => graph.untouched += 1,
-                (NONE, below) => graph.from_source[below as usize] += 1,
-                (above, NONE) => graph.to_drain[above as usize] += 1,
-                (above, below) => arcs.push(key(above, below)),
+        for is_bare in [false, true] {
+            for &[above, below, triangles] in arcs.iter().filter(|arc| (arc[2] == 0) == is_bare) {
+                match (above, below) {
+                    (NONE, NONE) => {}
+                    (NONE, below) => graph.from_source[below as usize] += triangles,
+                    (above, NONE) => graph.to_drain[above as usize] += triangles,
+                    (above, below) => {
+                        graph.children[above as usize].push(Arc { node: below, triangles });
+                        graph.parents[below as usize].push(Arc { node: above, triangles });
+                    }
+                }
             }
         }
-        arcs.sort_unstable();
-        let mut bare: Vec<u64> = versions.bare.iter().map(|&(above, below)| key(above, below)).collect();
-        bare.sort_unstable();
-        bare.dedup();
-        bare.retain(|arc| arcs.binary_search(arc).is_err());
-        let counted = arcs.chunk_by(|a, b| a == b).map(|same| (same[0], same.len() as u32));
-        for (arc, triangles) in counted.chain(bare.into_iter().map(|arc| (arc, 0))) {
-            let (above, below) = ((arc >> 32) as u32, arc as u32);
-            graph.children[above as usize].push(Arc { node: below, triangles });
-            graph.parents[below as usize].push(Arc { node: above, triangles });
-        }
         graph
-    }
-
-    /// Arcs and the triangles on them, those of the source and the drain included.
-    pub fn totals(&self) -> (u64, u64) {
-        let ends = self.from_source.iter().chain(&self.to_drain).chain([&self.untouched]);
-        let inner = self.children.iter().flatten().map(|arc| (1, u64::from(arc.triangles)));
-        inner
-            .chain(ends.filter(|&&t| t > 0).map(|&t| (1, u64::from(t))))
-            .fold((0, 0), |(arcs, triangles), (a, t)| (arcs + a, triangles + t))
-    }
-
-    /// Triangles on the ingoing arcs of a node: what is shown while it is folded.
-    pub fn coarse(&self, node: u32) -> u32 {
-        let node = node as usize;
-        self.parents[node].iter().map(|arc| arc.triangles).sum::<u32>() + self.from_source[node]
-    }
-
-    /// Triangles on the outgoing arcs of a node: what it shows while everything below is folded.
-    pub fn fine(&self, node: u32) -> u32 {
-        let node = node as usize;
-        self.children[node].iter().map(|arc| arc.triangles).sum::<u32>() + self.to_drain[node]
     }
 }

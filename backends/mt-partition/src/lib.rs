@@ -19,7 +19,7 @@
 //! ```
 //!
 //! A collapse of the log is a node of a directed acyclic graph; an arc from one node to another holds the triangles that
-//! the lower one makes and the upper one takes away (`versions`). Nodes are merged until arcs hold about ten triangles
+//! the lower one makes and the upper one takes away (`build::versions`). Nodes are merged until arcs hold about ten triangles
 //! (`reduce`), laid out in partitions (`partition`), and written to a file that keeps patches with their nodes
 //! (`format`, `record`). At run time the displayed mesh is a set of arcs (`display`); nodes are read by a
 //! thread (`reader`) and let go of by one of five modes (`cache`).
@@ -40,7 +40,6 @@ mod memory;
 mod order;
 mod paging;
 mod partition;
-mod plan;
 mod reader;
 mod record;
 mod reduce;
@@ -48,9 +47,8 @@ mod residents;
 mod strips;
 mod tree;
 mod verify;
-mod versions;
 
-pub use build::{WriteReport, write};
+pub use build::{LEAST_MEMORY, Workspace, WriteReport, write, write_within};
 pub use cache::CacheMode;
 pub use error::MtError;
 pub use file::{MtFile, StoredNode};

@@ -14,6 +14,8 @@ const LIMIT: usize = 2048;
 #[derive(Debug)]
 pub(crate) struct Order {
     position: Vec<u32>,
+    /// Nodes that keep their positions, as others may rely on them; empty if there is none.
+    fixed: Vec<bool>,
     mark: Vec<u32>,
     round: u32,
     stack: Vec<u32>,
@@ -23,11 +25,12 @@ pub(crate) struct Order {
 }
 
 impl Order {
-    /// The order of a graph whose arcs lead from larger numbers to smaller ones.
-    pub fn descending(nodes: usize) -> Self {
+    /// An order that is known. The positions of some nodes are fixed.
+    pub fn new(position: Vec<u32>, fixed: Vec<bool>) -> Self {
         Self {
-            position: (0..nodes as u32).rev().collect(),
-            mark: vec![0; nodes],
+            mark: vec![0; position.len()],
+            position,
+            fixed,
             round: 0,
             stack: Vec::new(),
             above: Vec::new(),
@@ -41,8 +44,13 @@ impl Order {
         self.position[node as usize]
     }
 
+    pub fn is_fixed(&self, node: u32) -> bool {
+        self.fixed.get(node as usize).is_some_and(|&fixed| fixed)
+    }
+
     /// Makes room for `upper` and `lower`, its child, to become one node, `upper`. Says whether that is possible: not if
-    /// there is another path from one to the other, or if it takes too long to find out.
+    /// there is another path from one to the other, or if it takes too long to find out, or if a node would have to move
+    /// that is fixed. What leads on from a fixed node need not be known: none is passed.
     pub fn merge(&mut self, graph: &Graph, upper: u32, lower: u32) -> bool {
         let (start, end) = (self.position(upper), self.position(lower));
         self.round += 1;
@@ -59,6 +67,9 @@ impl Order {
                         return false;
                     }
                 } else if position < end && self.mark[child.node as usize] != round {
+                    if self.is_fixed(child.node) {
+                        return false;
+                    }
                     self.mark[child.node as usize] = round;
                     self.below.push(child.node);
                     self.stack.push(child.node);
@@ -73,6 +84,9 @@ impl Order {
             for parent in &graph.parents[node as usize] {
                 let position = self.position[parent.node as usize];
                 if position > start && self.mark[parent.node as usize] != round {
+                    if self.is_fixed(parent.node) {
+                        return false;
+                    }
                     self.mark[parent.node as usize] = round;
                     self.above.push(parent.node);
                     self.stack.push(parent.node);

@@ -12,6 +12,7 @@
 //! All of this runs on the thread of the tree; see [`reader`](crate::reader) for the one that reads.
 
 mod answers;
+mod cut;
 mod foresight;
 mod room;
 
@@ -19,12 +20,12 @@ use std::ops::Range;
 use std::sync::Arc;
 use std::time::Duration;
 
-use rustc_hash::{FxHashMap, FxHashSet};
+use rustc_hash::FxHashMap;
 use vertex_tree::{NONE, NodeId, PageStats, Prefetch};
 
 use self::foresight::Foresight;
 use self::room::Need;
-use crate::cache::{CacheMode, PartitionState, Passed};
+use crate::cache::{CacheMode, PartitionState};
 use crate::file::MtFile;
 use crate::memory::Memory;
 use crate::reader::{Answer, Line, NOW, Reader, Ticket};
@@ -68,6 +69,17 @@ struct Read {
 /// of otherwise. A front that never comes to rest must not keep everything.
 const PATIENCE: u32 = 16;
 
+/// What is known of a node, in memory or not: all that a change asks about its neighbours lies together.
+#[derive(Clone, Copy, Debug)]
+struct NodeState {
+    partition: u32,
+    /// Its arcs in the cut.
+    links: u32,
+    is_active: bool,
+    /// Whether it is on its way and there is room for it.
+    is_reserved: bool,
+}
+
 #[derive(Debug)]
 pub(crate) struct Paging {
     file: Arc<MtFile>,
@@ -75,16 +87,12 @@ pub(crate) struct Paging {
     line: Line,
     pub residents: Residents,
     partitions: Vec<PartitionState>,
-    /// For each node, its arcs in the cut.
-    links: Vec<u32>,
-    active: Vec<bool>,
+    nodes: Vec<NodeState>,
     frame: u64,
     /// By the node that is to change.
     groups: FxHashMap<u32, Group>,
     /// By what is read, a partition or a node.
     reads: FxHashMap<u32, Read>,
-    /// Nodes on their way for which there is room.
-    reserved: FxHashSet<u32>,
     /// Changes of this frame for which there was no room.
     deferred: Vec<(u32, Change)>,
     /// A change for which there was none although everything gave way, and whether it has been asked for in this frame.
@@ -97,6 +105,8 @@ pub(crate) struct Paging {
     failures: FxHashMap<u32, (u32, u64)>,
     dirty: Vec<u32>,
     answers: Vec<Answer>,
+    /// Nodes that an answer has brought, in ascending order. Kept for its allocation.
+    brought: Vec<u32>,
     unanswered_frames: u32,
     /// This tree's number among those that share the budget.
     member: u64,
@@ -122,6 +132,12 @@ impl Paging {
         reader: Reader,
     ) -> Self {
         let member = memory.join();
+        let state = |node| NodeState {
+            partition: file.partition_of(node),
+            links: 0,
+            is_active: false,
+            is_reserved: false,
+        };
         let mut paging = Self {
             member,
             wanted: 0,
@@ -130,18 +146,17 @@ impl Paging {
             mode,
             residents: Residents::new(file.nodes(), memory),
             partitions: vec![PartitionState::default(); file.partitions.len() - 1],
-            links: vec![0; file.nodes() as usize],
-            active: vec![false; file.nodes() as usize],
+            nodes: (0..file.nodes()).map(state).collect(),
             frame: 0,
             groups: FxHashMap::default(),
             reads: FxHashMap::default(),
-            reserved: FxHashSet::default(),
             deferred: Vec::new(),
             first: None,
             again: Vec::new(),
             failures: FxHashMap::default(),
             dirty: Vec::new(),
             answers: Vec::new(),
+            brought: Vec::new(),
             unanswered_frames: 0,
             pressed: 0,
             keeps_all: false,
@@ -151,7 +166,7 @@ impl Paging {
             file,
         };
         for root in &paging.file.clone().roots {
-            paging.set_links(root.0, 1);
+            paging.enter(root.0);
         }
         paging
     }
@@ -173,66 +188,31 @@ impl Paging {
         }
     }
 
-    // The cut.
-
-    fn set_links(&mut self, node: u32, links: u32) {
-        let before = std::mem::replace(&mut self.links[node as usize], links);
-        if (before > 0) == (links > 0) {
-            return;
-        }
-        let partition = self.file.partition_of(node);
-        let state = &mut self.partitions[partition as usize];
-        if links > 0 {
-            state.in_cut += 1;
-        } else {
-            state.in_cut -= 1;
-            self.residents.touch(node);
-            self.mark(partition);
-        }
-    }
-
-    fn mark(&mut self, partition: u32) {
-        if self.keeps_all {
-            return;
-        }
-        if !std::mem::replace(&mut self.partitions[partition as usize].is_dirty, true) {
-            self.dirty.push(partition);
+    /// Starts to read what a change of a node touches into the cache, in steps that follow each other.
+    #[inline]
+    pub fn prepare(&self, node: u32, step: usize) {
+        match step {
+            0 => {
+                self.residents.prefetch_slot(node);
+                vertex_tree::prefetch(&self.nodes, node as usize);
+            }
+            1 => self.residents.prefetch(node),
+            _ => {
+                if let Some(record) = self.residents.get(node) {
+                    record.prefetch();
+                }
+            }
         }
     }
 
-    /// An arc of the node has come into the cut.
-    fn note(&mut self, node: u32, change: Change) {
-        let partition = self.file.partition_of(node);
-        let state = &mut self.partitions[partition as usize];
-        match change {
-            Change::Unfold => state.came_down = true,
-            Change::Fold => state.came_up = true,
+    /// The same for the records of nodes that are in memory and about to be asked for.
+    #[inline]
+    pub fn prepare_all(&self, nodes: &[u32]) {
+        for &node in nodes {
+            if let Some(record) = self.residents.get(node) {
+                record.prefetch();
+            }
         }
-        self.mark(partition);
-    }
-
-    pub fn is_active(&self, node: u32) -> bool {
-        self.active[node as usize]
-    }
-
-    /// A node in memory has been unfolded, and so have `above` before, or folded: arcs come into the cut and leave it.
-    pub fn changed(&mut self, node: u32, change: Change, above: &[u32], below: &[u32], arcs: u32) {
-        self.active[node as usize] = change == Change::Unfold;
-        let (gain, loss) = match change {
-            Change::Unfold => (below, above),
-            Change::Fold => (above, below),
-        };
-        for &n in gain {
-            self.set_links(n, self.links[n as usize] + 1);
-            self.note(n, change);
-        }
-        for &n in loss {
-            self.set_links(n, self.links[n as usize].saturating_sub(1));
-        }
-        // A root without triangles is shown by nothing; it is in play all the same.
-        self.set_links(node, arcs.max(1));
-        self.note(node, change);
-        self.count_use(node, gain);
     }
 
     // Requests.
@@ -241,7 +221,10 @@ impl Paging {
     pub fn has(&mut self, node: u32, change: Change) -> bool {
         if let Some(record) = self.residents.get(node) {
             let mut all = true;
-            change.neighbours(record, |n| all &= self.residents.contains(n));
+            change.neighbours(record, |n| {
+                all &= self.residents.contains(n);
+                self.residents.prefetch(n);
+            });
             if all {
                 self.first = self.first.filter(|&(first, _)| first != node);
                 return true;
@@ -345,7 +328,7 @@ impl Paging {
         let units =
             if self.mode.reads_partitions() { self.partitions.len() as u32 } else { self.file.nodes() };
         for unit in 0..units {
-            let is_missing = |n: &u32| !self.residents.contains(*n) && !self.reserved.contains(n);
+            let is_missing = |n: &u32| !self.residents.contains(*n) && !self.nodes[*n as usize].is_reserved;
             let missing: Vec<u32> = self.nodes_of(unit).filter(is_missing).collect();
             if self.is_paused(unit) || missing.is_empty() {
                 continue;
@@ -353,7 +336,7 @@ impl Paging {
             if !self.residents.memory().try_reserve(missing.iter().map(|&n| self.bytes_of(n)).sum()) {
                 return;
             }
-            self.reserved.extend(missing);
+            missing.iter().for_each(|&n| self.nodes[n as usize].is_reserved = true);
             if !self.ask(unit, u64::MAX, None) {
                 self.release_reserved(unit);
             }
@@ -399,50 +382,12 @@ impl Paging {
         stats.resident_bytes = self.residents.bytes();
         stats
     }
-
-    /// Lets go of what the cache mode does not keep, in the partitions where anything has changed.
-    fn clean(&mut self) {
-        let mut dirty = std::mem::take(&mut self.dirty);
-        let mut postponed = Vec::new();
-        for partition in dirty.drain(..) {
-            self.partitions[partition as usize].is_dirty = false;
-            let nodes =
-                self.file.partitions[partition as usize]..self.file.partitions[partition as usize + 1];
-            let state = self.partitions[partition as usize];
-            let layer = |&n: &u32| self.residents.get(n).map(Record::layer);
-            let in_cut = nodes.clone().filter(|&n| self.links[n as usize] > 0);
-            let layers = in_cut.filter_map(|n| layer(&n));
-            let cut = [layers.clone().min().unwrap_or(0), layers.max().unwrap_or(0)];
-            let mut is_postponed = false;
-            for node in nodes {
-                let Some(layer) = self.residents.get(node).map(Record::layer) else {
-                    continue;
-                };
-                let passed = Passed { layer, is_active: self.active[node as usize] };
-                let is_kept = self.links[node as usize] > 0 || state.keeps(self.mode, cut, passed);
-                if is_kept || self.foresight.as_ref().is_some_and(|f| f.keeps(node)) {
-                    continue;
-                }
-                if self.residents.is_free(node, self.frame) {
-                    self.let_go(node);
-                } else {
-                    is_postponed = true;
-                }
-            }
-            if is_postponed {
-                postponed.push(partition);
-            }
-        }
-        self.dirty = dirty;
-        for partition in postponed {
-            self.mark(partition);
-        }
-    }
 }
 
 impl Drop for Paging {
     fn drop(&mut self) {
-        let reserved = self.reserved.iter().map(|&n| self.bytes_of(n)).sum();
+        let is_reserved = |&n: &u32| self.nodes[n as usize].is_reserved;
+        let reserved = (0..self.file.nodes()).filter(is_reserved).map(|n| self.bytes_of(n)).sum();
         self.residents.memory().release(reserved);
         self.residents.memory().want(self.member, 0);
     }

@@ -17,17 +17,6 @@ pub enum QueueOrder {
     Decreasing,
 }
 
-/// For each node, the number of arcs on the longest path from the source: 1 for a root. `nodes` are all nodes, parents
-/// before their children.
-pub(crate) fn layers(graph: &Graph, nodes: &[u32]) -> Vec<u32> {
-    let mut layers = vec![0; graph.parents.len()];
-    for &node in nodes {
-        let above = graph.parents[node as usize].iter().map(|p| layers[p.node as usize]).max();
-        layers[node as usize] = above.unwrap_or(0) + 1;
-    }
-    layers
-}
-
 /// The nodes of a partition, and what joins it to others.
 #[derive(Clone, Debug)]
 struct Partition {

@@ -22,6 +22,8 @@
 //! otherwise four. A patch is a list of corners, three a triangle, or strips, each its number of corners in a byte and
 //! then those: whichever is smaller. An arc without triangles is a dependency and nothing else.
 
+use std::io;
+
 use vertex_tree::{Bounds, NONE};
 
 use crate::strips;
@@ -60,8 +62,12 @@ pub(crate) struct Draft<'a> {
 }
 
 impl Draft<'_> {
-    /// Appends the record to `out`; `positions` are those of the input.
-    pub fn encode(&self, positions: &[[f32; 3]], out: &mut Vec<u8>) {
+    /// Appends the record to `out`; `position` gives that of an input vertex.
+    pub fn encode(
+        &self,
+        mut position: impl FnMut(u32) -> io::Result<[f32; 3]>,
+        out: &mut Vec<u8>,
+    ) -> io::Result<()> {
         let start = out.len();
         let mut vertices: Vec<u32> =
             self.arcs.iter().flat_map(|arc| arc.triangles).flatten().copied().collect();
@@ -90,11 +96,12 @@ impl Draft<'_> {
         }
         for &v in &vertices {
             word(v);
-            positions[v as usize].into_iter().for_each(|x| word(x.to_bits()));
+            position(v)?.into_iter().for_each(|x| word(x.to_bits()));
         }
         out.extend_from_slice(&patches);
         let checksum = crc32fast::hash(&out[start + 4..]);
         out[start..start + 4].copy_from_slice(&checksum.to_le_bytes());
+        Ok(())
     }
 }
 
@@ -223,6 +230,14 @@ impl Record {
             return Err(("triangles below a node", self.fine().into()));
         }
         Ok(())
+    }
+
+    /// Starts to read bounds, layer and arcs into the cache: all of it that is not geometry, as far as it mostly goes.
+    #[inline]
+    pub fn prefetch(&self) {
+        for line in 0..3 {
+            vertex_tree::prefetch(&self.bytes, 64 * line);
+        }
     }
 
     /// Bytes as stored.
@@ -362,7 +377,7 @@ mod tests {
         let draft =
             Draft { number: 2, bounds, layer: 5, coarse: 8, above: &[(1, 0), (NONE, 9)], arcs: &arcs };
         let mut bytes = Vec::new();
-        draft.encode(&positions, &mut bytes);
+        draft.encode(|v| Ok(positions[v as usize]), &mut bytes).unwrap();
         bytes
     }
 

@@ -10,7 +10,7 @@
 use std::cmp::Reverse;
 use std::collections::BinaryHeap;
 
-use vertex_tree::{Bounds, CollapseLog, NONE};
+use vertex_tree::{Bounds, NONE};
 
 use crate::graph::{Arc, Graph};
 use crate::order::Order;
@@ -18,6 +18,11 @@ use crate::order::Order;
 /// A tolerance of one pixel in an image of 1080 lines with a field of view of 60 degrees makes a node of error `eps`
 /// coarse within `radius + eps * REACH`.
 const REACH: f64 = 935.0;
+
+/// How far away a viewer is at most to see a node refined.
+pub(crate) fn reach(bounds: &Bounds) -> f32 {
+    (f64::from(bounds.radius) + REACH * f64::from(bounds.eps)) as f32
+}
 
 /// A graph whose nodes are groups of collapses.
 #[derive(Debug)]
@@ -47,39 +52,47 @@ struct Candidate {
 }
 
 impl Reduction {
-    /// Merges nodes until arcs hold `patch` triangles on average, as far as that is possible.
-    pub fn new(log: &CollapseLog, graph: Graph, patch: f64) -> Self {
+    /// Before anything is merged. Reaches and sizes are given for each node, and arcs and triangles in the end have to
+    /// be to each other as those of a larger graph, with `totals`, of which this one is a part.
+    pub fn new(
+        graph: Graph,
+        order: Order,
+        reach: Vec<f32>,
+        sizes: Vec<[u32; 2]>,
+        (arcs, triangles): (u64, u64),
+    ) -> Self {
         let nodes = graph.children.len();
-        let (arcs, triangles) = graph.totals();
-        let reach = |b: &Bounds| (f64::from(b.radius) + REACH * f64::from(b.eps)) as f32;
-        let mut reduction = Self {
-            sizes: (0..nodes as u32).map(|n| [graph.fine(n), graph.coarse(n)]).collect(),
-            graph,
-            order: Order::descending(nodes),
-            into: (0..nodes as u32).collect(),
-            reach: log.collapses.iter().map(|c| reach(&c.bounds)).collect(),
-            stamp: vec![0; nodes],
-            arcs,
-            triangles,
-            refused: 0,
-        };
-        reduction.run(patch);
-        reduction
+        let (into, stamp) = ((0..nodes as u32).collect(), vec![0; nodes]);
+        Self { graph, order, into, reach, sizes, stamp, arcs, triangles, refused: 0 }
+    }
+
+    /// Arcs and triangles that are left.
+    pub fn totals(&self) -> (u64, u64) {
+        (self.arcs, self.triangles)
+    }
+
+    /// Of a node: its reach, and the triangles on its outgoing and ingoing arcs.
+    pub fn node(&self, node: u32) -> (f32, [u32; 2]) {
+        (self.reach[node as usize], self.sizes[node as usize])
     }
 
     fn is_reduced(&self, patch: f64) -> bool {
         self.triangles as f64 >= patch * self.arcs as f64
     }
 
-    fn run(&mut self, patch: f64) {
+    /// Merges nodes until arcs hold `patch` triangles on average, or no candidate is left whose key is at most `limit`.
+    /// Returns the least key of those that are, if any. Nodes whose positions are fixed are not merged.
+    pub fn run(&mut self, patch: f64, limit: f64) -> Option<f64> {
         if self.is_reduced(patch) {
-            return;
+            return None;
         }
         let mut queue = BinaryHeap::new();
-        for upper in 0..self.into.len() as u32 {
+        for upper in (0..self.into.len() as u32).filter(|&n| !self.order.is_fixed(n)) {
             for at in 0..self.graph.children[upper as usize].len() {
                 let lower = self.graph.children[upper as usize][at].node;
-                queue.push(Reverse(self.candidate(upper, lower)));
+                if !self.order.is_fixed(lower) {
+                    queue.push(Reverse(self.candidate(upper, lower)));
+                }
             }
         }
         let mut most = 2 * queue.len();
@@ -93,6 +106,10 @@ impl Reduction {
             if !self.is_current(&candidate) {
                 continue;
             }
+            let key = f64::from_bits(candidate.key);
+            if key > limit {
+                return Some(key);
+            }
             let Candidate { upper, lower, .. } = candidate;
             if !self.order.merge(&self.graph, upper, lower) {
                 self.refused += 1;
@@ -101,13 +118,18 @@ impl Reduction {
             self.merge(upper, lower);
             for at in 0..self.graph.children[upper as usize].len() {
                 let child = self.graph.children[upper as usize][at].node;
-                queue.push(Reverse(self.candidate(upper, child)));
+                if !self.order.is_fixed(child) {
+                    queue.push(Reverse(self.candidate(upper, child)));
+                }
             }
             for at in 0..self.graph.parents[upper as usize].len() {
                 let parent = self.graph.parents[upper as usize][at].node;
-                queue.push(Reverse(self.candidate(parent, upper)));
+                if !self.order.is_fixed(parent) {
+                    queue.push(Reverse(self.candidate(parent, upper)));
+                }
             }
         }
+        None
     }
 
     fn is_current(&self, candidate: &Candidate) -> bool {
@@ -205,7 +227,7 @@ impl Reduction {
 const LEAST: usize = 1 << 12;
 
 /// Weight of a triangle of the merged node against one that is shown too early: see DESIGN.md for what others gave.
-const SIZE: f64 = 0.05;
+pub(crate) const SIZE: f64 = 0.05;
 
 /// Adds triangles to the arc to `node`, and says whether there was none.
 fn add(arcs: &mut Vec<Arc>, node: u32, triangles: u32) -> bool {

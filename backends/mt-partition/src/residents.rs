@@ -68,6 +68,18 @@ impl Residents {
         self.all.get(self.slots[node as usize] as usize).map(|r| &r.record)
     }
 
+    /// Starts to read the place of a node into the cache.
+    #[inline]
+    pub fn prefetch_slot(&self, node: u32) {
+        vertex_tree::prefetch(&self.slots, node as usize);
+    }
+
+    /// Starts to read what leads to the record of a node, once its place is there.
+    #[inline]
+    pub fn prefetch(&self, node: u32) {
+        vertex_tree::prefetch(&self.all, self.slots[node as usize] as usize);
+    }
+
     fn get_mut(&mut self, node: u32) -> Option<&mut Resident> {
         self.all.get_mut(self.slots[node as usize] as usize)
     }
@@ -75,9 +87,10 @@ impl Residents {
     /// Takes in a node of so many bytes, for which room has been reserved, and which is not in memory.
     pub fn insert(&mut self, node: u32, record: Record, bytes: u64) {
         self.slots[node as usize] = self.all.len() as u32;
-        self.all.push(Resident { node, record, pins: 0, stays: 0, stamp: 0 });
+        self.stamp = self.stamp.wrapping_add(1);
+        self.all.push(Resident { node, record, pins: 0, stays: 0, stamp: self.stamp });
         self.bytes += bytes;
-        self.touch(node);
+        self.enqueue(node, self.stamp);
     }
 
     /// The node goes to the end of the queue.
@@ -86,12 +99,16 @@ impl Residents {
         let stamp = self.stamp;
         if let Some(resident) = self.get_mut(node) {
             resident.stamp = stamp;
-            self.queue.push_back((node, stamp));
-            // Entries that are out of date are not worth more memory than the nodes are.
-            if self.queue.len() > 4 * self.all.len() + 64 {
-                let Self { queue, slots, all, .. } = self;
-                queue.retain(|&(n, s)| all.get(slots[n as usize] as usize).is_some_and(|r| r.stamp == s));
-            }
+            self.enqueue(node, stamp);
+        }
+    }
+
+    fn enqueue(&mut self, node: u32, stamp: u32) {
+        self.queue.push_back((node, stamp));
+        // Entries that are out of date are not worth more memory than the nodes are.
+        if self.queue.len() > 4 * self.all.len() + 64 {
+            let Self { queue, slots, all, .. } = self;
+            queue.retain(|&(n, s)| all.get(slots[n as usize] as usize).is_some_and(|r| r.stamp == s));
         }
     }
 

@@ -13,6 +13,7 @@ use crate::file::MtFile;
 use crate::memory::Memory;
 use crate::paging::{Change, Paging};
 use crate::reader::Reader;
+use crate::record::Record;
 
 /// How a tree pages.
 #[derive(Clone, Debug, Default)]
@@ -110,6 +111,10 @@ impl MtTree {
         self.above.retain(|&n| n != NONE);
         self.below.clear();
         self.below.extend(record.below());
+        if change == Change::Unfold {
+            // The engine looks at each of them.
+            self.paging.prepare_all(&self.below);
+        }
         let arcs = match change {
             Change::Unfold => {
                 self.displayed = (self.displayed + fine).saturating_sub(coarse);
@@ -133,6 +138,8 @@ impl MtTree {
 }
 
 impl VertexTree for MtTree {
+    const PREPARATION: usize = 3;
+
     fn node_limit(&self) -> u32 {
         self.file.nodes()
     }
@@ -146,7 +153,7 @@ impl VertexTree for MtTree {
     }
 
     fn bounds(&self, node: NodeId) -> Bounds {
-        let record = || self.paging.residents.get(node.0).map(crate::record::Record::bounds);
+        let record = || self.paging.residents.get(node.0).map(Record::bounds);
         // Asked of nothing but roots and what is in memory.
         record().or_else(|| self.file.root_bounds(node)).unwrap_or(Bounds {
             center: [0.0; 3],
@@ -166,6 +173,19 @@ impl VertexTree for MtTree {
         record
             .into_iter()
             .flat_map(|record| record.above().map(|(n, _)| n).filter(|&n| n != NONE).map(NodeId))
+    }
+
+    #[inline]
+    fn children_and_parents(
+        &self,
+        node: NodeId,
+    ) -> impl Iterator<Item = (NodeId, Bounds, impl Iterator<Item = NodeId>)> {
+        let residents = &self.paging.residents;
+        residents.get(node.0).into_iter().flat_map(Record::below).filter_map(|below| {
+            let child = residents.get(below)?;
+            let parents = child.above().map(|(n, _)| n).filter(|&n| n != NONE).map(NodeId);
+            Some((NodeId(below), child.bounds(), parents))
+        })
     }
 
     fn log_number(&self, node: NodeId) -> u32 {
@@ -218,6 +238,11 @@ impl VertexTree for MtTree {
             }
         }
         Ok(Step::Done)
+    }
+
+    #[inline]
+    fn prepare<M: MeshSink>(&self, node: NodeId, step: usize, _: &M) {
+        self.paging.prepare(node.0, step);
     }
 
     fn look_ahead(&self) -> u32 {

@@ -156,6 +156,14 @@ pub trait VertexTree {
     fn children_and_bounds(&self, node: NodeId) -> impl Iterator<Item = (NodeId, Bounds)> {
         self.children(node).map(|child| (child, self.bounds(child)))
     }
+    /// The children, each with its [`bounds`](Self::bounds) and its [`parents`](Self::parents): one access for a backend
+    /// that stores them together. Asked where nodes may have several parents.
+    fn children_and_parents(
+        &self,
+        node: NodeId,
+    ) -> impl Iterator<Item = (NodeId, Bounds, impl Iterator<Item = NodeId>)> {
+        self.children(node).map(|child| (child, self.bounds(child), self.parents(child)))
+    }
     /// The cone of normals of a node that is no root, asked for as it comes into play. Cones are nested as bounds are,
     /// but for roots, which have none.
     fn normal_cone(&self, node: NodeId) -> NormalCone {

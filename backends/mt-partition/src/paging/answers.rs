@@ -29,22 +29,25 @@ impl Paging {
                         continue;
                     };
                     let bytes = self.bytes_of(node);
-                    let is_new = !self.residents.contains(node);
-                    if self.reserved.remove(&node) || is_new && self.residents.memory().try_reserve(bytes) {
+                    let state = &mut self.nodes[node as usize];
+                    let partition = state.partition;
+                    if std::mem::take(&mut state.is_reserved)
+                        || !self.residents.contains(node) && self.residents.memory().try_reserve(bytes)
+                    {
                         self.residents.insert(node, record, bytes);
-                        let partition = self.file.partition_of(node);
                         self.partitions[partition as usize].resident += 1;
                         self.mark(partition);
                         if let Some(foresight) = self.foresight.as_mut().filter(|_| is_ahead) {
                             foresight.unused.insert(node);
                         }
-                        for waiting in &waiting {
-                            if self.groups.get(waiting).is_some_and(|group| group.members.contains(&node)) {
-                                self.residents.pin(node);
-                            }
-                        }
+                        self.brought.push(node);
                     }
                 }
+                for group in waiting.iter().filter_map(|waiting| self.groups.get(waiting)) {
+                    let is_brought = |n: &&u32| self.brought.binary_search(n).is_ok();
+                    group.members.iter().filter(is_brought).for_each(|&n| self.residents.pin(n));
+                }
+                self.brought.clear();
             }
         }
         self.release_reserved(unit);

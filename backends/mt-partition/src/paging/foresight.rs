@@ -103,7 +103,7 @@ impl Paging {
         for (node, frames) in naming.drain(..) {
             let due = self.frame + u64::from(frames);
             foresight.name(node, due);
-            let change = if self.active[node as usize] { Change::Fold } else { Change::Unfold };
+            let change = if self.nodes[node as usize].is_active { Change::Fold } else { Change::Unfold };
             if let Some(record) = self.residents.get(node) {
                 change.neighbours(record, |n| foresight.name(n, due));
             }
@@ -129,7 +129,7 @@ impl Paging {
             }
         }
         for node in gone {
-            self.mark(self.file.partition_of(node));
+            self.mark(self.nodes[node as usize].partition);
         }
     }
 

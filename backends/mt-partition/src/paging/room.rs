@@ -20,28 +20,30 @@ impl Paging {
     /// Reserves room for those of some nodes that have none yet, and makes some if there is none. If that is not possible,
     /// returns how many bytes it takes.
     pub(super) fn reserve(&mut self, nodes: &[u32], need: Need) -> Result<(), u64> {
-        let unreserved = nodes.iter().filter(|n| !self.reserved.contains(n));
-        let bytes = unreserved.map(|&n| self.bytes_of(n)).sum();
+        let bytes = self.unreserved_bytes(nodes);
         while !self.residents.memory().try_reserve(bytes) {
             if !self.let_go_of_one(need) {
                 return Err(bytes);
             }
         }
         // Making room may have withdrawn a request that had room for some of them.
-        let again: Vec<u32> = nodes.iter().copied().filter(|n| !self.reserved.contains(n)).collect();
-        let total: u64 = again.iter().map(|&n| self.bytes_of(n)).sum();
-        if total > bytes {
+        if self.unreserved_bytes(nodes) > bytes {
             self.residents.memory().release(bytes);
             return self.reserve(nodes, need);
         }
-        self.reserved.extend(again);
+        nodes.iter().for_each(|&n| self.nodes[n as usize].is_reserved = true);
         Ok(())
     }
 
+    fn unreserved_bytes(&self, nodes: &[u32]) -> u64 {
+        let is_unreserved = |n: &&u32| !self.nodes[**n as usize].is_reserved;
+        nodes.iter().filter(is_unreserved).map(|&n| self.bytes_of(n)).sum()
+    }
+
     pub(super) fn let_go_of_one(&mut self, need: Need) -> bool {
-        let (links, foresight) = (&self.links, &self.foresight);
+        let (nodes, foresight) = (&self.nodes, &self.foresight);
         let is_foreseen = |n: u32| foresight.as_ref().is_some_and(|f| f.is_named(n));
-        let mut node = self.residents.oldest(self.frame, |n| links[n as usize] > 0 || is_foreseen(n));
+        let mut node = self.residents.oldest(self.frame, |n| nodes[n as usize].links > 0 || is_foreseen(n));
         if node.is_none() && need != Need::Change {
             node = self.residents.any(self.frame, is_foreseen);
         }
@@ -59,7 +61,7 @@ impl Paging {
                 self.let_go(node);
                 return true;
             }
-            if self.reserved.contains(&node) && self.withdraw(self.unit_of(node)) {
+            if self.nodes[node as usize].is_reserved && self.withdraw(self.unit_of(node)) {
                 return true;
             }
         }
@@ -71,7 +73,7 @@ impl Paging {
         if let Some(foresight) = &mut self.foresight {
             foresight.unused.remove(&node);
         }
-        let partition = self.file.partition_of(node) as usize;
+        let partition = self.nodes[node as usize].partition as usize;
         let state = &mut self.partitions[partition];
         state.resident -= 1;
         if state.resident == 0 {
@@ -93,7 +95,7 @@ impl Paging {
     /// What does not come needs no room.
     pub(super) fn release_reserved(&mut self, unit: u32) {
         for node in self.nodes_of(unit) {
-            if self.reserved.remove(&node) {
+            if std::mem::take(&mut self.nodes[node as usize].is_reserved) {
                 self.residents.memory().release(self.bytes_of(node));
             }
         }
