@@ -97,7 +97,7 @@ pub fn needed_bytes(vertices: u64, triangles: u64) -> u64 {
 }
 
 /// Bytes of temporary files that are needed at the worst moment to build a file of so many vertices and triangles with
-/// less memory: during the replay, 172 a vertex and 44 a triangle. Vertices that are split apart come on top.
+/// less memory: by the sizes of its arrays 172 a vertex and 44 a triangle, during the replay; not measured. Vertices that are split apart come on top.
 #[must_use]
 pub fn needed_disk_bytes(vertices: u64, triangles: u64) -> u64 {
     180 * vertices + 50 * triangles

@@ -4,7 +4,7 @@
 //! are in the input's order, in which neighbours may be far apart. So the collapses of a round are put in the order of a
 //! curve through space (Morton 1966). A round is told by the log alone: it has ended before a collapse that names a
 //! vertex which it has named already. A few collapses of the next round may have come by then without naming any, so the
-//! last [`TAIL`] before keep their order; of the simplification's rounds one in three does, so that many never pass unseen.
+//! last [`TAIL`] before keep their order.
 //! In these rounds collapses do not touch each other, so they may be put in any order; other logs remain logs, as no
 //! collapse comes before one that it builds on.
 //!
