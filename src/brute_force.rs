@@ -5,6 +5,7 @@
 //! once, and bounds and parents of all nodes are noted. From then on nothing is shared with it.
 
 use std::collections::VecDeque;
+use std::ops::ControlFlow;
 
 use vertex_tree::{Bounds, MeshSink, NodeId, NormalCone, NullSink, Step, TreeError, VertexTree};
 
@@ -37,7 +38,10 @@ impl BruteForce {
     /// What the backend reports.
     pub fn new<T: VertexTree>(tree: &mut T) -> Result<Self, TreeError> {
         let mut all = Self::default();
-        unfold_all(tree, &mut NullSink, |tree, node| all.add(tree, node))?;
+        unfold_all(tree, &mut NullSink, |tree, node| {
+            all.add(tree, node);
+            ControlFlow::Continue(())
+        })?;
         all.active = vec![false; all.nodes.len()];
         Ok(all)
     }
@@ -130,15 +134,15 @@ impl BruteForce {
     }
 }
 
-/// Unfolds all nodes of a tree that is wholly folded, parents before their children, and calls `unfolded` for each.
-/// Waits for pages.
+/// Unfolds all nodes of a tree that is wholly folded, the nearest to the roots first, and calls `unfolded` for each, until
+/// that breaks off. Waits for pages.
 ///
 /// # Errors
 /// What the backend reports.
 pub fn unfold_all<T: VertexTree, M: MeshSink>(
     tree: &mut T,
     mesh: &mut M,
-    mut unfolded: impl FnMut(&T, NodeId),
+    mut unfolded: impl FnMut(&T, NodeId) -> ControlFlow<()>,
 ) -> Result<(), TreeError> {
     let mut active = vec![false; tree.node_limit() as usize];
     let mut waiting: VecDeque<NodeId> = tree.roots().iter().copied().collect();
@@ -153,7 +157,9 @@ pub fn unfold_all<T: VertexTree, M: MeshSink>(
             Step::Done => {
                 active[node.index()] = true;
                 put_off = 0;
-                unfolded(tree, node);
+                if unfolded(tree, node).is_break() {
+                    return Ok(());
+                }
                 waiting.extend(tree.children(node));
             }
             _ if put_off > 2 * waiting.len() + 100 => return Ok(()),

@@ -14,7 +14,7 @@ pub mod csv;
 mod replay;
 mod scene;
 
-use std::ops::Range;
+use std::ops::{ControlFlow, Range};
 use std::sync::Arc;
 use std::time::Duration;
 
@@ -297,6 +297,9 @@ pub struct Subject {
     check: Option<Check>,
 }
 
+/// Changes that [`Subject::outline`] makes: enough to tell how large a mesh is and whether it is flat.
+pub const OUTLINE: usize = 1 << 18;
+
 /// Brute force, over the collapse log or over a backend's own nodes.
 enum Check {
     Log(Oracle),
@@ -480,6 +483,19 @@ impl Subject {
     /// # Errors
     /// [`CompareError::Store`], [`CompareError::Tree`].
     pub fn finest(&self) -> Result<Mesh, CompareError> {
+        self.unfolded(usize::MAX)
+    }
+
+    /// What the mesh is like as a whole: [`finest`](Self::finest), unless that takes more than [`OUTLINE`] changes.
+    ///
+    /// # Errors
+    /// [`CompareError::Store`], [`CompareError::Tree`].
+    pub fn outline(&self) -> Result<Mesh, CompareError> {
+        self.unfolded(OUTLINE)
+    }
+
+    /// The mesh with so many nodes unfolded, those nearest to the roots.
+    fn unfolded(&self, mut most: usize) -> Result<Mesh, CompareError> {
         if let Store::InMemory(_, log) = &self.store {
             return Ok(log.mesh.clone());
         }
@@ -487,7 +503,11 @@ impl Subject {
         with_trees!(self, |open| {
             let mut tree = open(Opening::SETTLED)?;
             tree.base_mesh(&mut mesh).map_err(|e| self.tree_error(e))?;
-            unfold_all(&mut tree, &mut mesh, |_, _| {}).map_err(|e| self.tree_error(e))?;
+            let count = |_: &_, _| {
+                most -= 1;
+                if most == 0 { ControlFlow::Break(()) } else { ControlFlow::Continue(()) }
+            };
+            unfold_all(&mut tree, &mut mesh, count).map_err(|e| self.tree_error(e))?;
         });
         Ok(mesh.to_mesh())
     }

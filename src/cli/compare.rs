@@ -74,8 +74,8 @@ pub(super) fn compare(command: &Compare) -> Result<()> {
 fn walks(input: &Input, subjects: &[Replayable], paths: &[Path]) -> Result<Vec<Path>> {
     Ok(match (paths, input, subjects) {
         ([], Input::Scene(scene), _) => path::recorded(scene.kind())?.to_vec(),
-        // What is stored is unfolded wholly for this, and may not fit into memory: to be avoided with `--path`.
-        ([], _, [Replayable { log: None, subject, .. }, ..]) => vec![path::around(&subject.finest()?)],
+        // What is stored may not fit into memory.
+        ([], _, [Replayable { log: None, subject, .. }, ..]) => vec![path::around(&subject.outline()?)],
         ([], _, [Replayable { log: Some(log), .. }, ..]) => vec![path::around(&log.mesh)],
         (paths, ..) => paths.to_vec(),
     })
