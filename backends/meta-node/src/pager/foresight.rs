@@ -16,10 +16,11 @@ use super::Pager;
 use crate::lists::Class;
 use crate::waiting::Command;
 
-/// Look this far ahead at least, and at most. Two frames would do for a store of short latency, if it were never asked for more
-/// pages in a frame than it can read in one: where a car turns in a large city, the pages of several frames are fetched in
-/// the time before.
-const LEAST_AHEAD: u32 = 4;
+/// Look this far ahead at least, and at most.
+const LEAST_AHEAD: u32 = 2;
+/// At least where memory is full. What is let go of has to come again, and where a car turns in a large city, more pages are
+/// needed in a frame than a store can read in one: they are fetched in the time before.
+const LEAST_AHEAD_FULL: u32 = 4;
 const MOST_AHEAD: u32 = 60;
 
 /// What is left of the longest time of a fetch after another: half after 69. Where nothing is fetched, nothing is
@@ -99,7 +100,8 @@ impl Pager {
         if self.foresight.due.is_empty() || self.is_complete() {
             return 0;
         }
-        (self.foresight.taken.ceil() as u32 + 1).clamp(LEAST_AHEAD, MOST_AHEAD)
+        let least = if self.room_for_largest() == 0 { LEAST_AHEAD_FULL } else { LEAST_AHEAD };
+        (self.foresight.taken.ceil() as u32 + 1).clamp(least, MOST_AHEAD)
     }
 
     /// A change on a page is expected in so many frames.

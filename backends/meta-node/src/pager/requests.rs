@@ -172,7 +172,7 @@ impl Pager {
     }
 
     /// For how many of the largest pages there is room without dropping any.
-    fn room_for_largest(&self) -> u64 {
+    pub(super) fn room_for_largest(&self) -> u64 {
         self.allowed.saturating_sub(self.taken) / u64::from(self.file.header.largest_words).max(1)
     }
 
