@@ -8,11 +8,12 @@
 use std::path::Path;
 use std::sync::atomic::Ordering;
 
+use vertex_tree::external::Workspace;
 use vertex_tree::{CollapseLog, LogSource};
 
 use crate::arrange::Arranged;
 use crate::error::XfmError;
-use crate::storage::{Disk, Memory, Storage, Workspace};
+use crate::storage::{Disk, Memory, Storage};
 
 /// How to build a file.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]

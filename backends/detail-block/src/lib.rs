@@ -63,5 +63,5 @@ pub use file::XfmFile;
 pub use format::MAGIC;
 pub use paging::{ATTEMPTS, PagingCounts, SOON};
 pub use settings::{Io, Settings};
-pub use storage::Workspace;
 pub use tree::XfmTree;
+pub use vertex_tree::external::Workspace;

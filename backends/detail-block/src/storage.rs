@@ -9,19 +9,7 @@ use std::path::PathBuf;
 use std::sync::atomic::{AtomicBool, Ordering};
 
 use bytemuck::Pod;
-use vertex_tree::external::{self, Scratch, Sorter};
-
-/// What the construction of a file may take that does not fit in memory.
-#[derive(Clone, Debug)]
-pub struct Workspace<'a> {
-    /// Where temporary files are made.
-    pub folder: PathBuf,
-    /// Bytes of memory, for everything that grows with the mesh.
-    pub memory: u64,
-    /// Set by whoever wants it to end: it fails with [`XfmError::Interrupted`](crate::XfmError::Interrupted) soon
-    /// afterwards.
-    pub stop: &'a AtomicBool,
-}
+use vertex_tree::external::{self, Scratch, Sorter, Workspace};
 
 /// An array that is read and written by number.
 pub(crate) trait Elements<T> {

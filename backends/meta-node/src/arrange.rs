@@ -12,26 +12,14 @@
 use std::cell::RefCell;
 use std::io;
 use std::ops::Range;
-use std::path::PathBuf;
 use std::sync::atomic::{AtomicBool, Ordering};
 
-use vertex_tree::external::{Paged, Scratch};
+use vertex_tree::external::{Paged, Scratch, Workspace};
 use vertex_tree::{Bounds, LogSource};
 
 use crate::arranging::{Arranging, Failure};
 use crate::error::MetaNodeError;
 use crate::subtree::Span;
-
-/// What a hierarchy may take that is larger than memory.
-#[derive(Clone, Debug)]
-pub struct Workspace<'a> {
-    /// Where temporary files are made.
-    pub folder: PathBuf,
-    /// Bytes of memory. Beside this, 5 bytes a vertex and 40 a page are needed.
-    pub memory: u64,
-    /// Set by whoever wants it to end: it fails with [`MetaNodeError::Interrupted`] soon afterwards.
-    pub stop: &'a AtomicBool,
-}
 
 /// A node.
 #[derive(Clone, Debug)]

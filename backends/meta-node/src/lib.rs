@@ -40,11 +40,11 @@ mod verify;
 mod waiting;
 mod write;
 
-pub use arrange::Workspace;
 pub use dependencies::Dependencies;
 pub use error::MetaNodeError;
 pub use file::MetaNodeFile;
 pub use format::MAGIC;
 pub use settings::{InUse, Io, Settings};
 pub use tree::MetaNodeTree;
+pub use vertex_tree::external::Workspace;
 pub use write::{BuildOptions, WriteReport, write, write_within};

@@ -5,9 +5,10 @@ use std::io::{self, BufWriter, Seek, SeekFrom, Write};
 use std::path::Path;
 use std::sync::atomic::{AtomicBool, Ordering};
 
+use vertex_tree::external::Workspace;
 use vertex_tree::{CollapseLog, LogSource, NONE, output};
 
-use crate::arrange::{Arrangement, Node, Workspace};
+use crate::arrange::{Arrangement, Node};
 use crate::blocking::{self, Blocking};
 use crate::error::MetaNodeError;
 use crate::format::{HEADER_BYTES, Header};
@@ -52,13 +53,11 @@ pub struct WriteReport {
 /// # Errors
 /// As for [`write_within`].
 pub fn write(path: &Path, log: &CollapseLog, options: &BuildOptions) -> Result<WriteReport, MetaNodeError> {
-    let folder = path.parent().filter(|folder| !folder.as_os_str().is_empty()).unwrap_or(Path::new("."));
-    let stop = &AtomicBool::new(false);
-    write_within(path, log, options, &Workspace { folder: folder.to_owned(), memory: u64::MAX, stop })
+    write_within(path, log, options, &Workspace::beside(path, &AtomicBool::new(false)))
 }
 
 /// Writes the hierarchy of a log that may be larger than memory: whole, or not at all. The file is the same whatever the
-/// memory.
+/// memory. Beside it, 5 bytes a vertex and 40 a page are needed.
 ///
 /// # Errors
 /// [`MetaNodeError::Log`], [`MetaNodeError::Levels`], [`MetaNodeError::TooLarge`], [`MetaNodeError::Io`],

@@ -24,10 +24,10 @@ mod versions;
 mod writing;
 
 use std::io;
-use std::path::{Path, PathBuf};
+use std::path::Path;
 use std::sync::atomic::{AtomicBool, Ordering};
 
-use vertex_tree::external::Scratch;
+use vertex_tree::external::{Scratch, Workspace};
 use vertex_tree::{CollapseLog, LogCounts, LogError, LogSource, NONE, output};
 
 use crate::{BuildOptions, MtError};
@@ -59,18 +59,7 @@ pub struct WriteReport {
     pub bytes: u64,
 }
 
-/// What writing a file from a log that may be larger than memory may take.
-#[derive(Clone, Debug)]
-pub struct Workspace<'a> {
-    /// Where temporary files are made.
-    pub folder: PathBuf,
-    /// Bytes of memory. Less than [`LEAST_MEMORY`] is taken for that much.
-    pub memory: u64,
-    /// Set by whoever wants it to end.
-    pub stop: &'a AtomicBool,
-}
-
-/// Less memory than this can not be asked for.
+/// Less memory than this is taken for so much.
 pub const LEAST_MEMORY: u64 = 1 << 16;
 
 /// What can go wrong.
@@ -117,9 +106,7 @@ impl Work<'_> {
 /// # Errors
 /// As for [`write_within`].
 pub fn write(path: &Path, log: &CollapseLog, options: &BuildOptions) -> Result<WriteReport, MtError> {
-    let folder = path.parent().filter(|folder| !folder.as_os_str().is_empty()).unwrap_or(Path::new("."));
-    let stop = &AtomicBool::new(false);
-    write_within(path, log, options, &Workspace { folder: folder.to_owned(), memory: u64::MAX, stop })
+    write_within(path, log, options, &Workspace::beside(path, &AtomicBool::new(false)))
 }
 
 /// Arranges a log that may be larger than memory as a reduced, partitioned multi-triangulation and writes it to a file,

@@ -48,7 +48,7 @@ mod strips;
 mod tree;
 mod verify;
 
-pub use build::{LEAST_MEMORY, Workspace, WriteReport, write, write_within};
+pub use build::{LEAST_MEMORY, WriteReport, write, write_within};
 pub use cache::CacheMode;
 pub use error::MtError;
 pub use file::{MtFile, StoredNode};
@@ -57,6 +57,7 @@ pub use memory::Memory;
 pub use partition::QueueOrder;
 pub use reader::Reader;
 pub use tree::{MtTree, Settings};
+pub use vertex_tree::external::Workspace;
 
 /// How to build a file.
 #[derive(Clone, Copy, Debug, PartialEq)]

@@ -8,8 +8,10 @@ mod array;
 mod paged;
 mod scratch;
 mod sort;
+mod workspace;
 
 pub use array::Array;
 pub use paged::Paged;
 pub use scratch::{BackReader, Reader, Scratch, Spool};
 pub use sort::Sorter;
+pub use workspace::Workspace;

@@ -1,0 +1,23 @@
+use std::path::{Path, PathBuf};
+use std::sync::atomic::AtomicBool;
+
+/// What the writer of a backend may take, for a log that may be larger than memory.
+#[derive(Clone, Debug)]
+pub struct Workspace<'a> {
+    /// Where temporary files are made.
+    pub folder: PathBuf,
+    /// Bytes of memory, for everything that grows with the mesh. What a writer needs beside it, it says.
+    pub memory: u64,
+    /// Set by whoever wants it to end: the writer fails soon afterwards, and leaves nothing behind.
+    pub stop: &'a AtomicBool,
+}
+
+impl<'a> Workspace<'a> {
+    /// As much memory as serves, and temporary files beside `output`.
+    #[must_use]
+    pub fn beside(output: &Path, stop: &'a AtomicBool) -> Self {
+        let folder =
+            output.parent().filter(|folder| !folder.as_os_str().is_empty()).unwrap_or(Path::new("."));
+        Self { folder: folder.to_owned(), memory: u64::MAX, stop }
+    }
+}
