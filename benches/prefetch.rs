@@ -46,8 +46,8 @@ const REST: usize = 240;
 const FRAME: Duration = Duration::from_nanos(16_666_667);
 const LATENCY: Duration = Duration::from_millis(5);
 
-/// Times as fast as recorded that the paths are replayed by the wall clock.
-const WALL_FRAME: Duration = Duration::from_millis(4);
+/// Frames of each path that are replayed by the wall clock.
+const WALL_FRAMES: usize = 600;
 
 fn main() {
     let wanted: Vec<String> = std::env::args().skip(1).filter(|a| !a.starts_with('-')).collect();
@@ -111,7 +111,7 @@ fn compare(mesh: &str, log: &foldfront::CollapseLog) {
             "stop"
         );
         let memory: Vec<u64> = walks.iter().map(|walk| virtual_time(&file, mesh, walk)).collect();
-        if let (Some(walk), Some(&page_memory)) = (walks.first(), memory.first()) {
+        for (walk, page_memory) in walks.iter().zip(memory) {
             wall_clock(&file, mesh, walk, page_memory);
         }
     }
@@ -217,9 +217,9 @@ fn wall_clock(file: &FilePath, mesh: &str, walk: &Path, page_memory: u64) {
         let source = Arc::new(SlowLater { source, latency_ms: AtomicU64::new(0) });
         let store = Store::from_source(source.clone()).expect("a valid file");
         let mut subject = Subject::of_store(mesh, store);
-        let options = options(Pace::WallClock(WALL_FRAME), page_memory, vec![prefetch]);
+        let options = options(Pace::WallClock(FRAME), page_memory, vec![prefetch]);
         let runs = subject
-            .replay(walk, 0..walk.frames.len(), &options, &mut |_, _| {
+            .replay(walk, 0..walk.frames.len().min(WALL_FRAMES), &options, &mut |_, _| {
                 source.latency_ms.store(latency, Ordering::Relaxed);
             })
             .expect("a valid file");

@@ -114,5 +114,5 @@ fn something_else_is_refused() {
         assert!(error.to_string().contains(message), "{error}");
     }
     let missing = mt_partition::write("/nowhere/at/all.mt".as_ref(), &ball_log(1), &BuildOptions::default());
-    assert!(missing.unwrap_err().to_string().starts_with("/nowhere/at/all.mt"));
+    assert!(missing.unwrap_err().to_string().contains("/nowhere/at"));
 }
