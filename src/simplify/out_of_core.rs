@@ -177,8 +177,8 @@ pub fn build_within(
         stop: limits.stop,
         threads: limits.threads.max(1),
         // The allocator keeps back what windows have taken, for each thread that has freed them: there must be room beside
-        // it for all that is left, and for several threads' windows.
-        whole_bytes: memory / 8 * 5,
+        // it for all that is left, and for several threads' windows. Components are joined only once all of them fit.
+        whole_bytes: if options.merge_components { memory - memory / 8 } else { memory / 8 * 5 },
         window_bytes: if limits.threads > 1 { memory / 8 * 5 } else { memory - memory / 8 },
         sort_bytes: (memory / 32) as usize,
         log: Log::new(&scratch).map_err(temporary)?,
