@@ -4,6 +4,7 @@
 //! box, so that a star, and the stars around it, share cache lines whatever the order of the input.
 
 use glam::Vec3;
+use vertex_tree::z_order;
 
 /// The curve through a box.
 #[derive(Clone, Copy, Debug)]
@@ -22,7 +23,7 @@ impl Curve {
     /// How far along the curve a point of the box lies.
     pub fn key(&self, p: Vec3) -> u32 {
         let cell = (p - self.low) * self.cells;
-        spread(cell.x as u32) | spread(cell.y as u32) << 1 | spread(cell.z as u32) << 2
+        z_order(cell.to_array().map(|x| x as u32))
     }
 }
 
@@ -35,13 +36,4 @@ pub(super) fn spatial_order(positions: &[Vec3]) -> Vec<u32> {
         (0_u64..).zip(positions).map(|(v, &p)| u64::from(curve.key(p)) << 32 | v).collect();
     order.sort_unstable();
     order.into_iter().map(|entry| entry as u32).collect()
-}
-
-/// Puts two zero bits between each of the lowest 10 bits.
-fn spread(x: u32) -> u32 {
-    let x = x & 0x3ff;
-    let x = (x | x << 16) & 0x0300_00ff;
-    let x = (x | x << 8) & 0x0300_f00f;
-    let x = (x | x << 4) & 0x030c_30c3;
-    (x | x << 2) & 0x0924_9249
 }

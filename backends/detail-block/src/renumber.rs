@@ -22,7 +22,7 @@ use std::collections::VecDeque;
 
 use bytemuck::{Pod, Zeroable};
 use vertex_tree::external::Sorter;
-use vertex_tree::{Bounds, Collapse, LogError, LogSource};
+use vertex_tree::{Collapse, LogError, LogSource, z_order};
 
 use crate::error::{Failure, XfmError};
 use crate::half_edges::{BOUNDARY, HalfEdge, Reverses, triangle_of};
@@ -263,17 +263,10 @@ fn after(number: u32, [place, n, removed, kept, eps]: [u32; 5]) -> [u32; 6] {
 /// The place of a point on the Z-order curve through a grid of 1024 cells a side.
 fn place(position: [f32; 3], [low, high]: [[f32; 3]; 2]) -> u32 {
     let side = (0..3).fold(0.0_f64, |side, i| side.max(f64::from(high[i]) - f64::from(low[i])));
-    let mut place = 0;
-    for axis in 0..3 {
+    z_order(std::array::from_fn(|axis| {
         let along = f64::from(position[axis]) - f64::from(low[axis]);
-        let mut cell = if side > 0.0 { ((along / side * 1024.0) as u32).min(1023) } else { 0 };
-        // Two empty bits between any two.
-        for (shift, mask) in [(16, 0x0300_00ff), (8, 0x0300_f00f), (4, 0x030c_30c3), (2, 0x0924_9249)] {
-            cell = (cell | cell << shift) & mask;
-        }
-        place |= cell << axis;
-    }
-    place
+        if side > 0.0 { ((along / side * 1024.0) as u32).min(1023) } else { 0 }
+    }))
 }
 
 /// Fails if a collapse is none that can be.
@@ -284,15 +277,7 @@ fn check(n: usize, c: &Collapse, vertices: &mut impl Elements<Named>) -> Result<
             return Err(LogError::NoSuchVertex { collapse: n, vertex }.into());
         }
     }
-    if c.removed == c.kept {
-        return Err(LogError::IntoItself { collapse: n, vertex: c.kept }.into());
-    }
-    let Bounds { center, radius, eps } = c.bounds;
-    let sane = |x: f32| x.is_finite() && x >= 0.0;
-    if !(center.iter().all(|x| x.is_finite()) && sane(radius) && sane(eps)) {
-        return Err(LogError::BadBounds { collapse: n, bounds: c.bounds }.into());
-    }
-    Ok(())
+    Ok(c.check(n)?)
 }
 
 /// The collapse that lets a triangle vanish, or a number that is none's. The corner that is removed first moves, until two

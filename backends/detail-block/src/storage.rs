@@ -6,7 +6,7 @@
 
 use std::io;
 use std::path::PathBuf;
-use std::sync::atomic::{AtomicBool, Ordering};
+use std::sync::atomic::AtomicBool;
 
 use bytemuck::Pod;
 use vertex_tree::external::{self, Scratch, Sorter, Workspace};
@@ -147,6 +147,6 @@ impl Storage for Disk<'_> {
 
     #[inline(always)]
     fn check_stop(&self) -> io::Result<()> {
-        if self.stop.load(Ordering::Relaxed) { Err(io::ErrorKind::Interrupted.into()) } else { Ok(()) }
+        external::check_stop(self.stop)
     }
 }

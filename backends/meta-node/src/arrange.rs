@@ -14,7 +14,7 @@ use std::io;
 use std::ops::Range;
 use std::sync::atomic::{AtomicBool, Ordering};
 
-use vertex_tree::external::{Paged, Scratch, Workspace};
+use vertex_tree::external::{Paged, Scratch, Workspace, check_stop};
 use vertex_tree::{Bounds, LogSource};
 
 use crate::arranging::{Arranging, Failure};
@@ -123,9 +123,4 @@ impl Stored {
             otherwise
         })
     }
-}
-
-/// Fails if somebody wants the work to stop.
-pub(crate) fn check_stop(stop: &AtomicBool) -> io::Result<()> {
-    if stop.load(Ordering::Relaxed) { Err(io::Error::other("interrupted")) } else { Ok(()) }
 }

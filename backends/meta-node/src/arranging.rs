@@ -10,10 +10,10 @@ use std::io;
 use std::ops::Range;
 use std::sync::atomic::AtomicBool;
 
-use vertex_tree::external::{Scratch, Sorter, Spool};
+use vertex_tree::external::{Scratch, Sorter, Spool, check_stop};
 use vertex_tree::{Bounds, Collapse, LogError, LogSource, NONE};
 
-use crate::arrange::{Arrangement, Stored, check_stop};
+use crate::arrange::{Arrangement, Stored};
 use crate::subtree::{Span, Subtree};
 
 /// What can go wrong.
@@ -273,14 +273,7 @@ fn check(n: usize, c: &Collapse, below: &[u32]) -> Result<(), LogError> {
             return Err(LogError::NoSuchVertex { collapse: n, vertex });
         }
     }
-    if c.removed == c.kept {
-        return Err(LogError::IntoItself { collapse: n, vertex: c.kept });
-    }
-    if crate::page::are_sane(&c.bounds) {
-        Ok(())
-    } else {
-        Err(LogError::BadBounds { collapse: n, bounds: c.bounds })
-    }
+    c.check(n)
 }
 
 /// The nodes and their triangles on their way to disk.

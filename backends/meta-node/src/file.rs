@@ -87,7 +87,7 @@ impl MetaNodeFile {
             if page >= header.root_pages || before.is_some_and(|before| before >= number) {
                 return error(at, "the number of a root", number.into());
             }
-            if root.log_number >= header.collapses || !page::are_sane(&root.bounds) {
+            if root.log_number >= header.collapses || !root.bounds.is_sane() {
                 return error(at + 4, "the number in the log of a root", root.log_number.into());
             }
             before = Some(number);

@@ -253,10 +253,6 @@ pub(crate) fn bounds_words(b: &Bounds) -> [u32; 5] {
     [x, y, z, b.radius, b.eps].map(f32::to_bits)
 }
 
-pub(crate) fn are_sane(b: &Bounds) -> bool {
-    b.center.iter().all(|x| x.is_finite()) && [b.radius, b.eps].iter().all(|&x| x.is_finite() && x >= 0.0)
-}
-
 /// The checksum that a page should carry.
 pub(crate) fn checksum(words: &[u32]) -> u32 {
     let mut hasher = crc32fast::Hasher::new();
@@ -309,7 +305,7 @@ pub(crate) fn check(words: &[u32], number: u32, limits: &Limits) -> Result<Layou
     for link in 0..links {
         let Link { node, log_number, bounds } = page.link(link);
         let below = (node.0 >> limits.slot_bits).checked_sub(first_child);
-        if below.is_none_or(|below| below >= children) || log_number >= limits.collapses || !are_sane(&bounds)
+        if below.is_none_or(|below| below >= children) || log_number >= limits.collapses || !bounds.is_sane()
         {
             return Err("a link leads elsewhere than to a page below");
         }
@@ -339,7 +335,7 @@ pub(crate) fn check(words: &[u32], number: u32, limits: &Limits) -> Result<Layou
         {
             return Err("a node has an impossible parent, leaf or number");
         }
-        if !are_sane(&node.bounds()) || !node.position().iter().all(|x| x.is_finite()) {
+        if !node.bounds().is_sane() || !node.position().iter().all(|x| x.is_finite()) {
             return Err("a sphere, an error or a place is not a number");
         }
         if node.triangles_end() < end {

@@ -27,7 +27,7 @@ use std::io;
 use std::path::Path;
 use std::sync::atomic::{AtomicBool, Ordering};
 
-use vertex_tree::external::{Scratch, Workspace};
+use vertex_tree::external::{Scratch, Workspace, check_stop};
 use vertex_tree::{CollapseLog, LogCounts, LogError, LogSource, NONE, output};
 
 use crate::{BuildOptions, MtError};
@@ -96,7 +96,7 @@ struct Work<'a> {
 impl Work<'_> {
     /// Fails if somebody wants it to end.
     fn check(&self) -> io::Result<()> {
-        if self.stop.load(Ordering::Relaxed) { Err(io::ErrorKind::Interrupted.into()) } else { Ok(()) }
+        check_stop(self.stop)
     }
 }
 

@@ -17,6 +17,15 @@ pub struct Bounds {
     pub eps: f32,
 }
 
+impl Bounds {
+    /// Whether everything is finite, and radius and error are not negative: what a file may not hold otherwise.
+    #[must_use]
+    pub fn is_sane(&self) -> bool {
+        let Self { center, radius, eps } = self;
+        center.iter().all(|x| x.is_finite()) && [radius, eps].iter().all(|x| x.is_finite() && **x >= 0.0)
+    }
+}
+
 /// A cone that holds the normals of all input triangles incident to any leaf below a node, and the cones of all nodes that
 /// must be folded before this one can be.
 #[derive(Clone, Copy, Debug, PartialEq)]

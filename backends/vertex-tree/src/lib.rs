@@ -15,6 +15,7 @@
 //! Leaves of the forest are the input vertices. They can not be unfolded and have no [`NodeId`].
 
 mod bounds;
+mod curve;
 pub mod external;
 mod leaf_map;
 mod leaf_set;
@@ -32,6 +33,7 @@ mod stars;
 mod tree;
 
 pub use bounds::{Bounds, NormalCone};
+pub use curve::z_order;
 pub use log::{Collapse, CollapseLog, Forest, LogError, NONE};
 pub use log_file::{LogCounts, LogFileError, read_log, write_log, write_log_from};
 pub use log_source::{LogFile, LogSource, Records};

@@ -17,6 +17,23 @@ pub struct Collapse {
     pub bounds: Bounds,
 }
 
+impl Collapse {
+    /// Whether this, the collapse with a number, can be one, whatever the mesh. Whether its vertices are there depends on the
+    /// collapses before it.
+    ///
+    /// # Errors
+    /// [`LogError::IntoItself`], [`LogError::BadBounds`].
+    pub fn check(&self, number: usize) -> Result<(), LogError> {
+        if self.removed == self.kept {
+            return Err(LogError::IntoItself { collapse: number, vertex: self.kept });
+        }
+        if !self.bounds.is_sane() {
+            return Err(LogError::BadBounds { collapse: number, bounds: self.bounds });
+        }
+        Ok(())
+    }
+}
+
 /// A mesh and the collapses that simplify it, in order. Collapse number `i` makes inner node `i` of the forest.
 ///
 /// It can be replayed and stopped anywhere: after the first `m` collapses, a corner at input vertex `v` is shown at
@@ -154,14 +171,7 @@ impl CollapseLog {
                     return Err(LogError::NoSuchVertex { collapse: n, vertex });
                 }
             }
-            if c.removed == c.kept {
-                return Err(LogError::IntoItself { collapse: n, vertex: c.kept });
-            }
-            let b = c.bounds;
-            let sane = |x: f32| x.is_finite() && x >= 0.0;
-            if !(b.center.iter().all(|x| x.is_finite()) && sane(b.radius) && sane(b.eps)) {
-                return Err(LogError::BadBounds { collapse: n, bounds: b });
-            }
+            c.check(n)?;
             let (kept, removed) = (top[c.kept as usize], top[c.removed as usize]);
             forest.kept_child[n] = kept;
             forest.removed_child[n] = removed;

@@ -4,7 +4,7 @@ use std::io;
 
 use bytemuck::{Pod, Zeroable};
 use vertex_tree::external::{Array, Sorter, Spool};
-use vertex_tree::{Collapse, LogError, NONE};
+use vertex_tree::{LogError, NONE, z_order};
 
 use super::{Failure, Work};
 use crate::reduce::reach;
@@ -90,7 +90,7 @@ impl History {
                     return Err(LogError::NoSuchVertex { collapse: n, vertex }.into());
                 }
             }
-            check(n, &c)?;
+            c.check(n)?;
             fates.set(c.removed as usize, Fate { collapse: n as u32, kept: c.kept, place: NONE })?;
             let [key, other] = [&curve, &other].map(|curve| curve.key(c.bounds.center));
             sorted.push([key, n as u32, other, c.removed, c.kept, reach(&c.bounds).to_bits()])?;
@@ -129,19 +129,6 @@ impl History {
     }
 }
 
-fn check(n: usize, c: &Collapse) -> Result<(), LogError> {
-    if c.removed == c.kept {
-        return Err(LogError::IntoItself { collapse: n, vertex: c.kept });
-    }
-    let b = c.bounds;
-    let sane = |x: f32| x.is_finite() && x >= 0.0;
-    if b.center.iter().all(|x| x.is_finite()) && sane(b.radius) && sane(b.eps) {
-        Ok(())
-    } else {
-        Err(LogError::BadBounds { collapse: n, bounds: b })
-    }
-}
-
 /// The Z-order curve (Morton 1966) through a grid of 1024 cells a side.
 struct Curve {
     low: [f32; 3],
@@ -157,16 +144,6 @@ impl Curve {
 
     /// How far along the curve a point lies. Centres of spheres may lie outside of the box.
     fn key(&self, point: [f32; 3]) -> u32 {
-        let cell = |i: usize| spread(((point[i] - self.low[i]) * self.cells).clamp(0.0, 1023.0) as u32);
-        cell(0) | cell(1) << 1 | cell(2) << 2
+        z_order(std::array::from_fn(|i| ((point[i] - self.low[i]) * self.cells).clamp(0.0, 1023.0) as u32))
     }
-}
-
-/// Puts two zero bits between each of the lowest 10 bits.
-fn spread(x: u32) -> u32 {
-    let x = x & 0x3ff;
-    let x = (x | x << 16) & 0x0300_00ff;
-    let x = (x | x << 8) & 0x0300_f00f;
-    let x = (x | x << 4) & 0x030c_30c3;
-    (x | x << 2) & 0x0924_9249
 }

@@ -1,5 +1,6 @@
+use std::io;
 use std::path::{Path, PathBuf};
-use std::sync::atomic::AtomicBool;
+use std::sync::atomic::{AtomicBool, Ordering};
 
 /// What the writer of a backend may take, for a log that may be larger than memory.
 #[derive(Clone, Debug)]
@@ -20,4 +21,13 @@ impl<'a> Workspace<'a> {
             output.parent().filter(|folder| !folder.as_os_str().is_empty()).unwrap_or(Path::new("."));
         Self { folder: folder.to_owned(), memory: u64::MAX, stop }
     }
+}
+
+/// Fails if somebody wants the work to stop.
+///
+/// # Errors
+/// One of no particular kind: whoever wanted it knows.
+#[inline]
+pub fn check_stop(stop: &AtomicBool) -> io::Result<()> {
+    if stop.load(Ordering::Relaxed) { Err(io::Error::other("interrupted")) } else { Ok(()) }
 }
