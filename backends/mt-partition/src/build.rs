@@ -110,7 +110,7 @@ pub fn write(path: &Path, log: &CollapseLog, options: &BuildOptions) -> Result<W
 }
 
 /// Arranges a log that may be larger than memory as a reduced, partitioned multi-triangulation and writes it to a file,
-/// whole or not at all. With enough memory for the whole graph the file is that of [`write`]. With less, nodes are merged in
+/// whole or not at all. With enough memory for the whole graph the file is that of [`write()`]. With less, nodes are merged in
 /// another order, which depends on nothing but the log, the options and the memory. The base mesh has to fit in memory, as
 /// it has to for whoever opens the file.
 ///
