@@ -144,6 +144,16 @@ pub fn unfold_all<T: VertexTree, M: MeshSink>(
     mesh: &mut M,
     mut unfolded: impl FnMut(&T, NodeId) -> ControlFlow<()>,
 ) -> Result<(), TreeError> {
+    let all = unfold_what_can(tree, mesh, &mut unfolded);
+    tree.update_mesh(mesh);
+    all
+}
+
+fn unfold_what_can<T: VertexTree, M: MeshSink>(
+    tree: &mut T,
+    mesh: &mut M,
+    unfolded: &mut impl FnMut(&T, NodeId) -> ControlFlow<()>,
+) -> Result<(), TreeError> {
     let mut active = vec![false; tree.node_limit() as usize];
     let mut waiting: VecDeque<NodeId> = tree.roots().iter().copied().collect();
     let mut arrived = Vec::new();

@@ -348,6 +348,7 @@ impl<T: VertexTree, M: MeshSink> Engine<T, M> {
             let applied = step.carry_out(&self.flips, self.settings.work_cap, found, &mut self.urgent);
             (applied, step.counts, self.flips.tests + step.tests)
         });
+        self.tree.update_mesh(&mut self.mesh);
         let distinct = |nodes: &mut Vec<NodeId>| {
             nodes.sort_unstable();
             nodes.dedup();

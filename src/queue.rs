@@ -206,6 +206,16 @@ impl EventQueue {
         self.pool.push(&mut self.pressing, event);
     }
 
+    /// Cancels whatever is scheduled for a node of which nothing is likely to be: its event has come up.
+    #[inline]
+    pub fn retire(&mut self, slot: Slot) {
+        let Some(ticket) = self.tickets.get_mut(slot.index()) else { return };
+        *ticket = ticket.wrapping_add(1);
+        if *ticket == 0 {
+            self.sweep_all();
+        }
+    }
+
     /// Cancels whatever is scheduled for a node.
     #[inline]
     pub fn cancel(&mut self, slot: Slot) {

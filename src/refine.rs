@@ -129,6 +129,12 @@ pub(crate) trait Watch {
     /// The node is no longer what it was watched as, if it was watched.
     fn unwatch(&mut self, slot: Slot);
 
+    /// The same for a node whose status has just changed: what it was watched for has come up.
+    #[inline(always)]
+    fn changed(&mut self, slot: Slot) {
+        self.unwatch(slot);
+    }
+
     /// The node should have changed, but the backend refused for now: it must be found again in the next frame, even
     /// if nothing moves.
     fn refused(&mut self, slot: Slot, kind: Kind, bounds: Bounds);

@@ -71,8 +71,8 @@ impl<T: VertexTree> VertexTree for Settled<T> {
     fn normal_cone(&self, node: NodeId) -> NormalCone {
         self.tree.normal_cone(node)
     }
-    fn prepare<M: MeshSink>(&self, node: NodeId, step: usize, mesh: &M) {
-        self.tree.prepare(node, step, mesh);
+    fn prepare(&self, node: NodeId, step: usize) {
+        self.tree.prepare(node, step);
     }
     fn look_ahead(&self) -> u32 {
         self.tree.look_ahead()
@@ -103,6 +103,9 @@ impl<T: VertexTree> VertexTree for Settled<T> {
     }
     fn fold<M: MeshSink>(&mut self, node: NodeId, mesh: &mut M) -> Result<Step, TreeError> {
         self.insist(|tree| tree.fold(node, mesh))
+    }
+    fn update_mesh<M: MeshSink>(&mut self, mesh: &mut M) {
+        self.tree.update_mesh(mesh);
     }
     fn begin_frame(&mut self, arrived: &mut Vec<NodeId>) -> Result<(), TreeError> {
         self.tree.begin_frame(arrived)

@@ -159,7 +159,6 @@ pub struct MappedTree {
     base: Vec<u32>,
     mesh: Option<StarMesh>,
     displayed: u64,
-    scratch: Vec<LeafTriangle>,
 }
 
 const HEADER: usize = 64;
@@ -181,7 +180,6 @@ impl MappedTree {
             base: Vec::new(),
             mesh: None,
             displayed: 0,
-            scratch: Vec::new(),
         };
         let [nodes, leaves, triangles, _, roots, base] = counts;
         let at = HEADER + 64 * nodes + 12 * leaves + 12 * triangles;
@@ -262,27 +260,29 @@ impl VertexTree for MappedTree {
         }
         Ok(())
     }
-    fn unfold<M: MeshSink>(&mut self, node: NodeId, mesh: &mut M) -> Result<Step, TreeError> {
+    fn unfold<M: MeshSink>(&mut self, node: NodeId, _: &mut M) -> Result<Step, TreeError> {
         let brought = self.brought(node);
         self.displayed += brought.len() as u64;
         if let Some(mut stars) = self.mesh.take() {
             let Node { first, pivot, .. } = self.nodes()[node.index()];
-            let mut scratch = std::mem::take(&mut self.scratch);
-            scratch.clear();
-            scratch.extend(self.corners()[brought].iter().map(|&leaves| LeafTriangle::new(leaves, 0, 0)));
-            stars.split([first, pivot], self.places()[pivot as usize], &scratch, mesh);
-            self.scratch = scratch;
+            let brought = self.corners()[brought].iter().map(|&leaves| LeafTriangle::new(leaves, 0, 0));
+            stars.split([first, pivot], self.places()[pivot as usize], brought);
             self.mesh = Some(stars);
         }
         Ok(Step::Done)
     }
-    fn fold<M: MeshSink>(&mut self, node: NodeId, mesh: &mut M) -> Result<Step, TreeError> {
+    fn fold<M: MeshSink>(&mut self, node: NodeId, _: &mut M) -> Result<Step, TreeError> {
         self.displayed -= self.brought(node).len() as u64;
         let Node { first, pivot, .. } = self.nodes()[node.index()];
         if let Some(stars) = &mut self.mesh {
-            stars.merge([first, pivot], mesh);
+            stars.merge([first, pivot]);
         }
         Ok(Step::Done)
+    }
+    fn update_mesh<M: MeshSink>(&mut self, mesh: &mut M) {
+        if let Some(stars) = &mut self.mesh {
+            stars.update(mesh);
+        }
     }
     fn end_frame(&mut self) -> Result<PageStats, TreeError> {
         Ok(PageStats::default())

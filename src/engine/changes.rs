@@ -251,7 +251,7 @@ impl<T: VertexTree, M: MeshSink, F: Watch> Steps<'_, T, M, F> {
                         self.front.prefetch_linked(slot);
                         self.finder.prefetch(slot);
                     }
-                    self.tree.prepare(node, step, self.mesh);
+                    self.tree.prepare(node, step);
                 }
                 *prepared = end;
             }
@@ -323,10 +323,10 @@ impl<T: VertexTree, M: MeshSink, F: Watch> Steps<'_, T, M, F> {
             for child in self.front.children(self.tree, slot) {
                 self.finder.unwatch(child);
             }
-            self.finder.unwatch(slot);
+            self.finder.changed(slot);
             self.front.set_folded(self.tree, slot);
         } else {
-            self.finder.unwatch(slot);
+            self.finder.changed(slot);
             self.ready.clear();
             let finder = &mut *self.finder;
             self.front.set_folded_in_graph(self.tree, slot, |child| finder.unwatch(child), self.ready);
@@ -426,7 +426,7 @@ impl<T: VertexTree, M: MeshSink, F: Watch> Steps<'_, T, M, F> {
     #[inline(always)]
     fn unfolded(&mut self, slot: Slot) {
         self.counts.unfolds += 1;
-        self.finder.unwatch(slot);
+        self.finder.changed(slot);
         if T::IS_TREE {
             for parent in self.front.parents(self.tree, slot) {
                 if self.front.record(parent).is_collapsible() {

@@ -241,6 +241,11 @@ impl Watch for EventDriven {
     }
 
     #[inline(always)]
+    fn changed(&mut self, slot: Slot) {
+        self.queue.retire(slot);
+    }
+
+    #[inline(always)]
     fn prefetch(&self, slot: Slot) {
         self.queue.prefetch(slot);
     }

@@ -59,6 +59,9 @@ impl<T: VertexTree> VertexTree for Foreseen<T> {
         }
         Ok(step)
     }
+    fn update_mesh<M: MeshSink>(&mut self, mesh: &mut M) {
+        self.tree.update_mesh(mesh);
+    }
     fn look_ahead(&self) -> u32 {
         self.look_ahead
     }

@@ -55,7 +55,7 @@ impl InMemoryTree {
 
 impl VertexTree for InMemoryTree {
     const IS_TREE: bool = true;
-    const PREPARATION: usize = 1 + StarMesh::PREPARATION;
+    const PREPARATION: usize = 2;
 
     fn node_limit(&self) -> u32 {
         self.hierarchy.nodes.len() as u32
@@ -124,41 +124,41 @@ impl VertexTree for InMemoryTree {
         Ok(())
     }
 
-    fn unfold<M: MeshSink>(&mut self, node: NodeId, mesh: &mut M) -> Result<Step, TreeError> {
+    fn unfold<M: MeshSink>(&mut self, node: NodeId, _: &mut M) -> Result<Step, TreeError> {
         let h = &*self.hierarchy;
         let brought = h.brought(node.index());
         self.displayed += brought.len() as u64;
         if let Some(stars) = self.mesh.as_mut().filter(|_| M::KEEPS_MESH) {
             let Node { kept, removed, .. } = h.nodes[node.index()];
-            stars.split([kept, removed], h.positions[node.index()], brought, mesh);
+            stars.split([kept, removed], h.positions[node.index()], brought.iter().copied());
         }
         Ok(Step::Done)
     }
 
-    fn fold<M: MeshSink>(&mut self, node: NodeId, mesh: &mut M) -> Result<Step, TreeError> {
+    fn fold<M: MeshSink>(&mut self, node: NodeId, _: &mut M) -> Result<Step, TreeError> {
         let h = &*self.hierarchy;
         self.displayed -= h.brought(node.index()).len() as u64;
         if let Some(stars) = self.mesh.as_mut().filter(|_| M::KEEPS_MESH) {
             let Node { kept, removed, .. } = h.nodes[node.index()];
-            stars.merge([kept, removed], mesh);
+            stars.merge([kept, removed]);
         }
         Ok(Step::Done)
     }
 
+    fn update_mesh<M: MeshSink>(&mut self, mesh: &mut M) {
+        if let Some(stars) = &mut self.mesh {
+            stars.update(mesh);
+        }
+    }
+
     #[inline(always)]
-    fn prepare<M: MeshSink>(&self, node: NodeId, step: usize, mesh: &M) {
+    fn prepare(&self, node: NodeId, step: usize) {
         let h = &*self.hierarchy;
-        match (step, &self.mesh) {
-            (0, _) => prefetch(&h.nodes, node.index()),
-            (step, Some(stars)) => {
-                let Node { kept, removed, .. } = h.nodes[node.index()];
-                if step == 1 {
-                    prefetch(&h.positions, node.index());
-                    prefetch(&h.triangles, h.first_brought(node.index()) as usize);
-                }
-                stars.prepare([kept, removed], h.brought(node.index()), step - 1, mesh);
-            }
-            (_, None) => {}
+        if step == 0 {
+            prefetch(&h.nodes, node.index());
+        } else if self.mesh.is_some() {
+            prefetch(&h.positions, node.index());
+            prefetch(&h.triangles, h.first_brought(node.index()) as usize);
         }
     }
 

@@ -25,8 +25,6 @@ pub struct MetaNodeTree {
     mesh: Option<StarMesh>,
     rules: Option<Rules>,
     displayed: u64,
-    /// Room for the triangles that come with a split.
-    brought: Vec<LeafTriangle>,
     /// Nodes whose page was missing and has not come yet.
     refused: FxHashSet<NodeId>,
 }
@@ -46,7 +44,6 @@ impl MetaNodeTree {
             mesh: None,
             rules: Rules::new(settings.dependencies, leaves),
             displayed: 0,
-            brought: Vec::new(),
             refused: FxHashSet::default(),
         };
         for root in 0..tree.roots.len() {
@@ -162,7 +159,7 @@ impl MetaNodeTree {
 
 impl VertexTree for MetaNodeTree {
     const IS_TREE: bool = true;
-    const PREPARATION: usize = 3 + StarMesh::PREPARATION;
+    const PREPARATION: usize = 4;
 
     fn node_limit(&self) -> u32 {
         self.pager.file.header.pages << self.slot_bits
@@ -271,9 +268,12 @@ impl VertexTree for MetaNodeTree {
         let (children, leaves) = (of.children(), of.leaves());
         let (start, end) = page.brought_range(slot);
         if let Some(stars) = &mut self.mesh {
-            self.brought.clear();
-            self.brought.extend(page.brought(slot).map(|leaves| LeafTriangle::new(leaves, 0, 0)));
-            stars.split(leaves, of.position(), &self.brought, mesh);
+            let brought = page.brought(slot).map(|leaves| LeafTriangle::new(leaves, 0, 0));
+            stars.split(leaves, of.position(), brought);
+            // Rules look at the mesh as it is.
+            if self.rules.is_some() {
+                stars.update(mesh);
+            }
         }
         self.displayed += u64::from(end - start);
         if let (Some(rules), Some(stars)) = (&mut self.rules, &self.mesh) {
@@ -305,8 +305,9 @@ impl VertexTree for MetaNodeTree {
         let (children, leaves @ [kept, _], collapse) = (of.children(), of.leaves(), of.log_number());
         let (start, end) = page.brought_range(slot);
         if let Some(stars) = &mut self.mesh {
-            stars.merge(leaves, mesh);
+            stars.merge(leaves);
             if let Some(rules) = &mut self.rules {
+                stars.update(mesh);
                 halves(node.0 - slot, page, of).into_iter().for_each(|half| rules.leave(half));
                 let parent = match of.parent() {
                     Ok(slot) => Some(page.node(slot).log_number()),
@@ -321,8 +322,14 @@ impl VertexTree for MetaNodeTree {
         Ok(Step::Done)
     }
 
+    fn update_mesh<M: MeshSink>(&mut self, mesh: &mut M) {
+        if let Some(stars) = &mut self.mesh {
+            stars.update(mesh);
+        }
+    }
+
     #[inline(always)]
-    fn prepare<M: MeshSink>(&self, node: NodeId, step: usize, mesh: &M) {
+    fn prepare(&self, node: NodeId, step: usize) {
         let (page, slot) = self.place(node);
         if step == 0 {
             self.pager.prefetch_table(page);
@@ -334,23 +341,9 @@ impl VertexTree for MetaNodeTree {
             2 => self.pager.page(holder).prefetch(slot),
             _ => {
                 let page = self.pager.page(holder);
-                if step == 3 {
-                    page.prefetch_children(slot);
-                }
-                if let Some(stars) = &self.mesh
-                    && slot < page.layout.nodes
-                {
-                    let leaves = page.node(slot).leaves();
-                    if step == 3 {
-                        page.prefetch_brought(slot);
-                        stars.prepare(leaves, &[], 0, mesh);
-                        return;
-                    }
-                    // Most nodes bring two triangles; what there is beyond that is not prepared.
-                    let mut brought = [LeafTriangle::new([0; 3], 0, 0); 2];
-                    let two = brought.iter_mut().zip(page.brought(slot));
-                    let count = two.map(|(place, leaves)| *place = LeafTriangle::new(leaves, 0, 0)).count();
-                    stars.prepare(leaves, &brought[..count], step - 3, mesh);
+                page.prefetch_children(slot);
+                if self.mesh.is_some() {
+                    page.prefetch_brought(slot);
                 }
             }
         }

@@ -241,7 +241,7 @@ impl VertexTree for MtTree {
     }
 
     #[inline]
-    fn prepare<M: MeshSink>(&self, node: NodeId, step: usize, _: &M) {
+    fn prepare(&self, node: NodeId, step: usize) {
         self.paging.prepare(node.0, step);
     }
 

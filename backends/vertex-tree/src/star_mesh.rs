@@ -7,17 +7,23 @@
 //! * when a node splits, a corner stays or moves by one comparison with the first leaf of the removed side;
 //! * the vertex at which a new triangle's far corner is shown is the nearest shown vertex at or below its leaf: a
 //!   look-up in a [`LeafSet`], not a walk along parents;
-//! * the triangles that disappear when a node folds are those with a corner at both of its vertices.
+//! * the triangles that disappear when a node folds are those that its split has brought.
 //!
 //! Vertices and triangles live in slots that are used again, so everything here is as large as the displayed mesh and
 //! not as the hierarchy. A triangle is half a cache line, the corners at a vertex are another (see [`stars`]).
 //!
+//! Changes of status are noted, and the mesh [follows](StarMesh::update) all those of a frame together: see [`following`].
+//!
 //! [`stars`]: crate::stars
+
+mod following;
 
 use crate::leaf_map::LeafMap;
 use crate::leaf_set::LeafSet;
-use crate::stars::{Stars, corner, triangle_of};
-use crate::{MeshSink, NONE, TriangleId, VertexId, prefetch};
+use crate::stars::{Corner, Stars};
+use crate::{MeshSink, NONE, TriangleId, VertexId};
+
+use self::following::Change;
 
 /// A triangle of the hierarchy.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -61,11 +67,22 @@ impl LeafTriangle {
 #[derive(Clone, Copy, Debug)]
 #[repr(C, align(32))]
 struct Triangle {
-    leaves: [u32; 3],
-    vertices: [VertexId; 3],
     /// [`NONE`] in a hole.
+    vertices: [VertexId; 3],
+    /// The vertex that it came with and goes with; [`NONE`] for a triangle of the base mesh.
+    owner: VertexId,
+    leaves: [u32; 3],
+    /// By what number the backend knows it.
     number: u32,
-    _reserved: u32,
+}
+
+impl Triangle {
+    const HOLE: Self = Self { vertices: [NONE; 3], owner: NONE, leaves: [NONE; 3], number: NONE };
+
+    #[inline(always)]
+    fn new(triangle: LeafTriangle, vertices: [VertexId; 3], owner: VertexId) -> Self {
+        Self { vertices, owner, leaves: triangle.leaves, number: triangle.number() }
+    }
 }
 
 /// The displayed triangles, and the star of each displayed vertex.
@@ -79,6 +96,9 @@ pub struct StarMesh {
     /// Slots to use again. Some may lie beyond the last slot: those have been given up since.
     holes: Vec<TriangleId>,
     displayed: usize,
+    /// What is to be followed, and the triangles that come with it.
+    changes: Vec<Change>,
+    coming: Vec<LeafTriangle>,
 }
 
 /// Slots may be empty up to one in so many, and a few: then triangles at the end move into them.
@@ -95,6 +115,8 @@ impl StarMesh {
             triangles: Vec::new(),
             holes: Vec::new(),
             displayed: 0,
+            changes: Vec::new(),
+            coming: Vec::new(),
         }
     }
 
@@ -118,11 +140,8 @@ impl StarMesh {
 
     /// The vertices that share a displayed triangle with one, those across an inner edge twice.
     pub fn neighbours(&self, vertex: VertexId) -> impl Iterator<Item = VertexId> + '_ {
-        let around = self
-            .stars
-            .corners(vertex)
-            .iter()
-            .flat_map(|&corner| self.triangles[triangle_of(corner).0].vertices);
+        let corners = self.stars.corners(vertex).iter();
+        let around = corners.flat_map(|corner| self.triangles[corner.triangle() as usize].vertices);
         around.filter(move |&other| other != vertex)
     }
 
@@ -133,6 +152,7 @@ impl StarMesh {
     }
 
     /// A vertex of the base mesh appears.
+    #[inline(always)]
     pub fn add_vertex<M: MeshSink>(&mut self, leaf: u32, position: [f32; 3], mesh: &mut M) -> VertexId {
         let vertex = self.stars.add(leaf);
         self.shown.insert(leaf);
@@ -141,11 +161,10 @@ impl StarMesh {
         vertex
     }
 
-    /// A triangle appears, between vertices that are shown.
-    #[inline]
+    /// A triangle of the base mesh appears, between vertices that are shown.
     pub fn add_triangle<M: MeshSink>(&mut self, triangle: LeafTriangle, mesh: &mut M) {
         let vertices = triangle.leaves.map(|leaf| self.vertex_at(leaf));
-        self.show(triangle, vertices, mesh);
+        self.show(Triangle::new(triangle, vertices, NONE), mesh);
     }
 
     /// The vertex that stands for a leaf: every tree of the forest shows the first of its leaves at least, so there
@@ -156,16 +175,15 @@ impl StarMesh {
     }
 
     #[inline(always)]
-    fn show<M: MeshSink>(&mut self, triangle: LeafTriangle, vertices: [VertexId; 3], mesh: &mut M) {
-        let triangle =
-            Triangle { leaves: triangle.leaves, vertices, number: triangle.number(), _reserved: 0 };
+    fn show<M: MeshSink>(&mut self, triangle: Triangle, mesh: &mut M) -> TriangleId {
         let slot = loop {
             match self.holes.pop() {
-                Some(slot) if (slot as usize) < self.triangles.len() => {
-                    self.triangles[slot as usize] = triangle;
-                    break slot;
+                Some(slot) => {
+                    if let Some(place) = self.triangles.get_mut(slot as usize) {
+                        *place = triangle;
+                        break slot;
+                    }
                 }
-                Some(_) => {}
                 None => {
                     self.triangles.push(triangle);
                     break self.triangles.len() as u32 - 1;
@@ -173,35 +191,32 @@ impl StarMesh {
             }
         };
         self.displayed += 1;
-        for (i, vertex) in vertices.into_iter().enumerate() {
-            self.stars.push(vertex, corner(slot, i));
+        for i in 0..3 {
+            self.stars.push(triangle.vertices[i], Corner::new(slot, i));
         }
-        mesh.triangle_added(slot, vertices);
+        mesh.triangle_added(slot, triangle.vertices);
+        slot
     }
 
-    /// A node unfolds: the vertex of leaf `removed` comes back beside that of leaf `kept`, and `brought` are the
-    /// triangles that come with it.
-    #[inline]
-    pub fn split<M: MeshSink>(
+    /// The vertex of leaf `removed` comes back beside vertex `from`, and with it the triangles `brought`.
+    #[inline(always)]
+    fn split_vertex<M: MeshSink>(
         &mut self,
-        [kept, removed]: [u32; 2],
+        from: VertexId,
+        removed: u32,
         position: [f32; 3],
         brought: &[LeafTriangle],
         mesh: &mut M,
     ) {
-        let from = self.vertex_of_leaf.get(kept);
         let to = self.add_vertex(removed, position, mesh);
         let triangles = &mut self.triangles;
-        self.stars.split(from, to, |corner| {
-            let (t, i) = triangle_of(corner);
-            let triangle = &mut triangles[t];
-            let moves = triangle.leaves[i % 3] >= removed;
-            if moves {
-                triangle.vertices[i % 3] = to;
-                mesh.corner_moved(t as u32, i % 3, to);
-            }
-            moves
-        });
+        let moves =
+            |corner: Corner| triangles[corner.triangle() as usize].leaves[corner.index() % 3] >= removed;
+        self.stars.split(from, to, moves);
+        for &corner in self.stars.corners(to) {
+            triangles[corner.triangle() as usize].vertices[corner.index() % 3] = to;
+            mesh.corner_moved(corner.triangle(), corner.index() % 3, to);
+        }
         for &triangle in brought {
             let far = triangle.far();
             let far_vertex = self.vertex_at(triangle.far_leaf());
@@ -210,77 +225,64 @@ impl StarMesh {
                 leaf if leaf >= removed => to,
                 _ => from,
             });
-            self.show(triangle, vertices, mesh);
+            let slot = self.show(Triangle::new(triangle, vertices, to), mesh);
+            self.stars.bring(to, slot);
         }
     }
 
-    /// A node folds: the inverse of [`split`](Self::split).
-    #[inline]
-    pub fn merge<M: MeshSink>(&mut self, [kept, removed]: [u32; 2], mesh: &mut M) {
-        let to = self.vertex_of_leaf.get(kept);
-        let from = self.vertex_of_leaf.get(removed);
-        while let Some(corner) = self.stars.pop(from) {
-            let (t, i) = triangle_of(corner);
-            let triangle = &mut self.triangles[t];
-            let [a, b, c] = triangle.vertices;
-            if (a == to) | (b == to) | (c == to) {
-                for (j, vertex) in [a, b, c].into_iter().enumerate().filter(|&(j, _)| j != i) {
-                    self.stars.take(vertex, self::corner(t as u32, j));
-                }
-                triangle.number = NONE;
-                self.holes.push(t as u32);
-                self.displayed -= 1;
-                mesh.triangle_removed(t as u32);
-            } else {
-                triangle.vertices[i % 3] = to;
-                self.stars.push(to, corner);
-                mesh.corner_moved(t as u32, i % 3, to);
-            }
+    /// The inverse of [`split_vertex`](Self::split_vertex): vertex `from`, of leaf `removed`, goes, and what is left of its
+    /// star is at vertex `to`.
+    #[inline(always)]
+    fn merge_vertex<M: MeshSink>(&mut self, to: VertexId, from: VertexId, removed: u32, mesh: &mut M) {
+        match *self.stars.brought(from) {
+            // The rule.
+            [a, b] => [a, b].into_iter().for_each(|triangle| self.remove_brought(triangle, from, to, mesh)),
+            _ => self.remove_all_brought(from, to, mesh),
         }
+        let triangles = &mut self.triangles;
+        self.stars.merge(from, to, |corner| {
+            triangles[corner.triangle() as usize].vertices[corner.index() % 3] = to;
+            mesh.corner_moved(corner.triangle(), corner.index() % 3, to);
+        });
         self.stars.remove(from);
         self.shown.remove(removed);
         self.vertex_of_leaf.remove(removed);
         mesh.vertex_removed(from);
-        while self.triangles.len() - self.displayed > self.triangles.len() / HOLES + 256 {
-            self.close_hole(mesh);
+        if self.has_many_holes() {
+            self.close_holes(mesh);
         }
     }
 
-    /// Steps of [`prepare`](Self::prepare).
-    pub const PREPARATION: usize = 3;
-
-    /// Starts to read what a split or a merge of these leaves will read, step by step: see
-    /// [`VertexTree::prepare`](crate::VertexTree::prepare).
+    /// A triangle that came with vertex `from` disappears, before that is merged into `to`.
     #[inline(always)]
-    pub fn prepare<M: MeshSink>(
-        &self,
-        [kept, removed]: [u32; 2],
-        brought: &[LeafTriangle],
-        step: usize,
-        mesh: &M,
-    ) {
-        if step == 0 {
-            self.vertex_of_leaf.prefetch(kept);
-            self.vertex_of_leaf.prefetch(removed);
-            return;
+    fn remove_brought<M: MeshSink>(&mut self, slot: TriangleId, from: VertexId, to: VertexId, mesh: &mut M) {
+        let triangle = std::mem::replace(&mut self.triangles[slot as usize], Triangle::HOLE);
+        // The third corner is neither here nor there.
+        let far = triangle.vertices.into_iter().fold(from ^ to, |all, vertex| all ^ vertex);
+        for vertex in [from, to, far] {
+            self.stars.take(vertex, slot);
         }
-        // A vertex that is shown will be merged away, another will come back.
-        let (to, from) = (self.vertex_of_leaf.get(kept), self.vertex_of_leaf.get(removed));
-        if step == 1 {
-            self.stars.prefetch(to);
-            self.stars.prefetch(from);
-            if from == NONE {
-                brought.iter().for_each(|triangle| self.shown.prefetch(triangle.far_leaf()));
-            }
-            return;
+        self.holes.push(slot);
+        self.displayed -= 1;
+        mesh.triangle_removed(slot);
+    }
+
+    #[cold]
+    fn remove_all_brought<M: MeshSink>(&mut self, from: VertexId, to: VertexId, mesh: &mut M) {
+        for at in 0..self.stars.brought(from).len() {
+            self.remove_brought(self.stars.brought(from)[at], from, to, mesh);
         }
-        for &corner in self.stars.corners(if from == NONE { to } else { from }) {
-            let (t, _) = triangle_of(corner);
-            prefetch(&self.triangles, t);
-            mesh.prefetch(t as u32);
-        }
-        if from == NONE {
-            brought.iter().for_each(|triangle| self.stars.prefetch(self.vertex_at(triangle.far_leaf())));
+    }
+
+    #[inline(always)]
+    fn has_many_holes(&self) -> bool {
+        self.triangles.len() - self.displayed > self.triangles.len() / HOLES + 256
+    }
+
+    #[cold]
+    fn close_holes<M: MeshSink>(&mut self, mesh: &mut M) {
+        while self.has_many_holes() {
+            self.close_hole(mesh);
         }
     }
 
@@ -290,8 +292,11 @@ impl StarMesh {
         let last = self.triangles.len() as u32;
         while let Some(hole) = self.holes.pop() {
             if hole < last {
-                for (i, vertex) in triangle.vertices.into_iter().enumerate() {
-                    self.stars.replace(vertex, corner(last, i), corner(hole, i));
+                for vertex in triangle.vertices {
+                    self.stars.replace(vertex, last, hole);
+                }
+                if triangle.owner != NONE {
+                    self.stars.bring_instead(triangle.owner, last, hole);
                 }
                 self.triangles[hole as usize] = triangle;
                 mesh.triangle_removed(last);

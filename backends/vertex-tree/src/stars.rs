@@ -1,101 +1,185 @@
 //! The star of each displayed vertex: which corners of displayed triangles are there.
 //!
-//! Most vertices have about six. A star of up to 14 lies in one cache line; a larger one moves to a list of its own.
+//! Most vertices have about six. A star of up to 12 lies in one cache line; a larger one moves to a list of its own.
 
-use crate::{NONE, prefetch};
+use crate::{NONE, TriangleId, VertexId, prefetch};
 
 /// Corner `c` of the triangle in slot `t` is numbered `4 t + c`: the triangle is found by a shift.
-pub(crate) type Corner = u32;
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) struct Corner(u32);
 
-#[inline(always)]
-pub(crate) fn corner(triangle: u32, index: usize) -> Corner {
-    triangle << 2 | index as u32
+impl Corner {
+    const NONE: Self = Self(NONE);
+
+    #[inline(always)]
+    pub fn new(triangle: TriangleId, index: usize) -> Self {
+        Self(triangle << 2 | index as u32)
+    }
+
+    #[inline(always)]
+    pub fn triangle(self) -> TriangleId {
+        self.0 >> 2
+    }
+
+    /// 0, 1 or 2.
+    #[inline(always)]
+    pub fn index(self) -> usize {
+        (self.0 & 3) as usize
+    }
 }
 
-#[inline(always)]
-pub(crate) fn triangle_of(corner: Corner) -> (usize, usize) {
-    ((corner >> 2) as usize, (corner & 3) as usize)
-}
+/// Corners that fit beside the rest of a star.
+const NEAR: usize = 12;
 
-/// Corners that fit beside the rest of a star's cache line.
-const NEAR: usize = 14;
+/// The bit that says that what follows is the number of a list, see [`Star::brought`].
+const LISTED: u32 = 1 << 31;
+
+/// The number of the list of the triangles that came with a vertex, where there are more than two.
+#[inline(always)]
+fn list([_, second]: [TriangleId; 2]) -> Option<u32> {
+    (second != NONE && second & LISTED != 0).then_some(second & !LISTED)
+}
 
 #[derive(Clone, Copy, Debug)]
 #[repr(C, align(64))]
 struct Star {
     /// The leaf whose vertex is shown here; [`NONE`] in a hole.
     leaf: u32,
-    /// How many corners are in `near`, or [`FAR`] where they are in the list of which `near[0]` is the number.
+    /// How many corners are in `near`, or [`FAR`] where they are in the list of which `near[0]` has the number.
     count: u32,
+    /// The triangles that came with the vertex and go with it, [`NONE`] where there are fewer than two. Where there are more,
+    /// the second is [`LISTED`] and the number of a list of all.
+    brought: [TriangleId; 2],
     near: [Corner; NEAR],
 }
 
 const FAR: u32 = u32::MAX;
 
+impl Star {
+    /// Takes out the corner of a triangle; the last one takes its place.
+    #[inline(always)]
+    fn take(&mut self, triangle: TriangleId) {
+        // All places are compared, also unused ones: where a loop would end can not be predicted.
+        let mut found = 0;
+        for (at, corner) in self.near.iter().enumerate() {
+            found |= u32::from(corner.triangle() == triangle) << at;
+        }
+        let used = (1 << self.count) - 1;
+        if found & used != 0 {
+            self.count -= 1;
+            self.near[found.trailing_zeros() as usize % NEAR] = self.near[self.count as usize % NEAR];
+        }
+    }
+}
+
+/// Lists that are used again, each known by its number.
+#[derive(Clone, Debug)]
+struct Lists<T> {
+    lists: Vec<Vec<T>>,
+    unused: Vec<u32>,
+}
+
+impl<T> Default for Lists<T> {
+    fn default() -> Self {
+        Self { lists: Vec::new(), unused: Vec::new() }
+    }
+}
+
+impl<T: Copy> Lists<T> {
+    /// A new list, which is empty.
+    fn add(&mut self) -> u32 {
+        self.unused.pop().unwrap_or_else(|| {
+            self.lists.push(Vec::with_capacity(4 * NEAR));
+            self.lists.len() as u32 - 1
+        })
+    }
+
+    fn remove(&mut self, number: u32) {
+        self.lists[number as usize].clear();
+        self.unused.push(number);
+    }
+}
+
 /// The stars of all displayed vertices, by the vertex's slot.
 #[derive(Clone, Debug, Default)]
 pub(crate) struct Stars {
     stars: Vec<Star>,
-    holes: Vec<u32>,
-    far: Vec<Vec<Corner>>,
-    unused_far: Vec<u32>,
+    holes: Vec<VertexId>,
+    far: Lists<Corner>,
+    listed: Lists<TriangleId>,
 }
 
 impl Stars {
     /// A vertex appears; returns its slot. Slots are used again last in, first out.
-    #[inline]
-    pub fn add(&mut self, leaf: u32) -> u32 {
+    #[inline(always)]
+    pub fn add(&mut self, leaf: u32) -> VertexId {
         match self.holes.pop() {
             Some(slot) => {
                 let star = &mut self.stars[slot as usize];
                 star.leaf = leaf;
                 star.count = 0;
+                star.brought = [NONE; 2];
                 slot
             }
             None => {
-                self.stars.push(Star { leaf, count: 0, near: [NONE; NEAR] });
+                self.stars.push(Star { leaf, count: 0, brought: [NONE; 2], near: [Corner::NONE; NEAR] });
                 self.stars.len() as u32 - 1
             }
         }
     }
 
-    /// A vertex disappears. No corner is left there.
-    #[inline]
-    pub fn remove(&mut self, slot: u32) {
-        debug_assert!(self.corners(slot).is_empty());
+    /// A vertex disappears, and whatever corners are left there.
+    #[inline(always)]
+    pub fn remove(&mut self, slot: VertexId) {
         let star = &mut self.stars[slot as usize];
         star.leaf = NONE;
         if star.count == FAR {
-            self.unused_far.push(star.near[0]);
-            star.count = 0;
+            self.far.remove(star.near[0].0);
         }
+        star.count = 0;
+        if let Some(list) = list(star.brought) {
+            self.listed.remove(list);
+        }
+        star.brought = [NONE; 2];
         self.holes.push(slot);
     }
 
     /// The leaf that is shown in a slot; [`NONE`] in a hole.
     #[inline(always)]
-    pub fn leaf(&self, slot: u32) -> u32 {
+    pub fn leaf(&self, slot: VertexId) -> u32 {
         self.stars[slot as usize].leaf
     }
 
+    /// Whether a slot shows a leaf, and not that of another vertex.
     #[inline(always)]
-    pub fn prefetch(&self, slot: u32) {
-        prefetch(&self.stars, slot as usize);
+    pub fn shows(&self, slot: VertexId, leaf: u32) -> bool {
+        self.stars.get(slot as usize).is_some_and(|star| star.leaf == leaf)
     }
 
     #[inline(always)]
-    pub fn corners(&self, slot: u32) -> &[Corner] {
+    pub fn prefetch(&self, slot: VertexId) {
+        prefetch(&self.stars, slot as usize);
+    }
+
+    /// The first few corners at a vertex, and perhaps others that have been there: as many whatever the count, so that a loop
+    /// over them has no branch to mispredict.
+    #[inline(always)]
+    pub fn first(&self, slot: VertexId) -> [Corner; 7] {
+        let Some(star) = self.stars.get(slot as usize) else { return [Corner::NONE; 7] };
+        std::array::from_fn(|at| star.near[at])
+    }
+
+    /// The corners at a vertex.
+    pub fn corners(&self, slot: VertexId) -> &[Corner] {
         let star = &self.stars[slot as usize];
-        if star.count == FAR {
-            &self.far[star.near[0] as usize]
-        } else {
-            // The bound is never reached, and spares a panic.
-            &star.near[..(star.count as usize).min(NEAR)]
+        match star.near.get(..star.count as usize) {
+            Some(near) => near,
+            None => &self.far.lists[star.near[0].0 as usize],
         }
     }
 
     #[inline(always)]
-    pub fn push(&mut self, slot: u32, corner: Corner) {
+    pub fn push(&mut self, slot: VertexId, corner: Corner) {
         let star = &mut self.stars[slot as usize];
         match star.near.get_mut(star.count as usize) {
             Some(place) => {
@@ -107,102 +191,141 @@ impl Stars {
     }
 
     #[cold]
-    fn push_far(&mut self, slot: u32, corner: Corner) {
+    fn push_far(&mut self, slot: VertexId, corner: Corner) {
         let star = &mut self.stars[slot as usize];
         if star.count != FAR {
-            let number = self.unused_far.pop().unwrap_or_else(|| {
-                self.far.push(Vec::with_capacity(4 * NEAR));
-                self.far.len() as u32 - 1
-            });
-            let far = &mut self.far[number as usize];
-            far.clear();
-            far.extend_from_slice(&star.near);
+            let number = self.far.add();
+            self.far.lists[number as usize].extend_from_slice(&star.near);
+            star.near[0] = Corner(number);
             star.count = FAR;
-            star.near[0] = number;
         }
-        self.far[star.near[0] as usize].push(corner);
+        self.far.lists[star.near[0].0 as usize].push(corner);
     }
 
-    /// Replaces a corner that is in the star by another.
-    pub fn replace(&mut self, slot: u32, corner: Corner, by: Corner) {
-        let star = &mut self.stars[slot as usize];
-        let corners = match star.count {
-            FAR => &mut self.far[star.near[0] as usize][..],
-            count => &mut star.near[..(count as usize).min(NEAR)],
-        };
-        if let Some(place) = corners.iter_mut().find(|place| **place == corner) {
-            *place = by;
-        }
-    }
-
-    /// Takes a corner out of a star; the last one takes its place.
+    /// Takes the corner of a triangle out of a star; the last one takes its place.
     #[inline(always)]
-    pub fn take(&mut self, slot: u32, corner: Corner) {
+    pub fn take(&mut self, slot: VertexId, triangle: TriangleId) {
         let star = &mut self.stars[slot as usize];
         if star.count == FAR {
-            let far = &mut self.far[star.near[0] as usize];
-            if let Some(at) = far.iter().position(|&c| c == corner) {
+            let far = &mut self.far.lists[star.near[0].0 as usize];
+            if let Some(at) = far.iter().position(|corner| corner.triangle() == triangle) {
                 far.swap_remove(at);
             }
-            return;
-        }
-        // All places are compared, also unused ones: where a loop would end can not be predicted.
-        let mut found = 0;
-        for (at, &c) in star.near.iter().enumerate() {
-            found |= u32::from(c == corner) << at;
-        }
-        let used = (1 << star.count) - 1;
-        if found & used != 0 {
-            star.count -= 1;
-            star.near[found.trailing_zeros() as usize % NEAR] = star.near[star.count as usize % NEAR];
+        } else {
+            star.take(triangle);
         }
     }
 
     /// Moves the corners for which `moves` says so from one star to another, which is empty.
     #[inline(always)]
-    pub fn split(&mut self, from: u32, to: u32, mut moves: impl FnMut(Corner) -> bool) {
-        let star = &mut self.stars[from as usize];
+    pub fn split(&mut self, from: VertexId, to: VertexId, moves: impl Fn(Corner) -> bool) {
+        let Ok([star, other]) = self.stars.get_disjoint_mut([from as usize, to as usize]) else { return };
         if star.count == FAR {
-            return self.split_far(from, to, moves);
+            return self.split_far(from, to, &moves);
         }
-        let (corners, count) = (star.near, (star.count as usize).min(NEAR));
         // Both lists are written whether a corner goes there or not: only their lengths depend on it.
-        let (mut stay, mut go, mut gone) = (0, 0, [NONE; NEAR]);
-        for &corner in &corners[..count] {
+        let (mut stay, mut go) = (0, 0);
+        for at in 0..(star.count as usize).min(NEAR) {
+            let corner = star.near[at];
             let moves = usize::from(moves(corner));
-            star.near[stay % NEAR] = corner;
-            gone[go % NEAR] = corner;
+            star.near[stay] = corner;
+            other.near[go] = corner;
             go += moves;
             stay += 1 - moves;
         }
         star.count = stay as u32;
-        let star = &mut self.stars[to as usize];
-        star.near = gone;
-        star.count = go as u32;
+        other.count = go as u32;
     }
 
     #[cold]
-    fn split_far(&mut self, from: u32, to: u32, mut moves: impl FnMut(Corner) -> bool) {
-        let number = self.stars[from as usize].near[0] as usize;
-        let mut at = 0;
-        while let Some(&corner) = self.far[number].get(at) {
-            if moves(corner) {
-                self.far[number].swap_remove(at);
-                self.push(to, corner);
-            } else {
-                at += 1;
-            }
+    fn split_far(&mut self, from: VertexId, to: VertexId, moves: &dyn Fn(Corner) -> bool) {
+        let number = self.stars[from as usize].near[0].0 as usize;
+        let mut corners = std::mem::take(&mut self.far.lists[number]);
+        corners.iter().filter(|&&corner| moves(corner)).for_each(|&corner| self.push(to, corner));
+        corners.retain(|&corner| !moves(corner));
+        self.far.lists[number] = corners;
+    }
+
+    /// Moves all corners from one star to another, and tells `moved` of each.
+    #[inline(always)]
+    pub fn merge(&mut self, from: VertexId, to: VertexId, mut moved: impl FnMut(Corner)) {
+        let Ok([star, other]) = self.stars.get_disjoint_mut([from as usize, to as usize]) else { return };
+        let (count, others) = (star.count as usize, other.count as usize);
+        if count > NEAR || others > NEAR || count + others > NEAR {
+            return self.merge_far(from, to, &mut moved);
+        }
+        for (place, &corner) in other.near[others..].iter_mut().zip(&star.near[..count]) {
+            *place = corner;
+            moved(corner);
+        }
+        other.count += star.count;
+        star.count = 0;
+    }
+
+    #[cold]
+    fn merge_far(&mut self, from: VertexId, to: VertexId, moved: &mut dyn FnMut(Corner)) {
+        for at in 0..self.corners(from).len() {
+            let corner = self.corners(from)[at];
+            self.push(to, corner);
+            moved(corner);
         }
     }
 
-    /// Takes the last corner out of a star.
-    #[inline(always)]
-    pub fn pop(&mut self, slot: u32) -> Option<Corner> {
-        let star = &mut self.stars[slot as usize];
-        if star.count == FAR {
-            return self.far[star.near[0] as usize].pop();
+    /// A triangle that has a corner in the star has moved to another slot.
+    pub fn replace(&mut self, slot: VertexId, triangle: TriangleId, by: TriangleId) {
+        let found = self.corners(slot).iter().find(|corner| corner.triangle() == triangle);
+        if let Some(index) = found.map(|corner| corner.index()) {
+            self.take(slot, triangle);
+            self.push(slot, Corner::new(by, index));
         }
-        star.count = star.count.checked_sub(1)?;
-        Some(star.near[star.count as usize % NEAR])
+    }
+
+    /// The triangles that came with a vertex; none where there is no vertex.
+    #[inline(always)]
+    pub fn brought(&self, slot: VertexId) -> &[TriangleId] {
+        let Some(Star { brought, .. }) = self.stars.get(slot as usize) else { return &[] };
+        match *brought {
+            [NONE, _] => &[],
+            [_, NONE] => &brought[..1],
+            both => match list(both) {
+                None => brought,
+                Some(list) => &self.listed.lists[list as usize],
+            },
+        }
+    }
+
+    /// A triangle comes with a vertex.
+    #[inline(always)]
+    pub fn bring(&mut self, slot: VertexId, triangle: TriangleId) {
+        let brought = &mut self.stars[slot as usize].brought;
+        match *brought {
+            [NONE, _] => brought[0] = triangle,
+            [_, NONE] => brought[1] = triangle,
+            _ => self.bring_many(slot, triangle),
+        }
+    }
+
+    #[cold]
+    fn bring_many(&mut self, slot: VertexId, triangle: TriangleId) {
+        let brought = &mut self.stars[slot as usize].brought;
+        let list = list(*brought).unwrap_or_else(|| {
+            let list = self.listed.add();
+            self.listed.lists[list as usize].extend_from_slice(brought);
+            brought[1] = LISTED | list;
+            list
+        });
+        self.listed.lists[list as usize].push(triangle);
+    }
+
+    /// A triangle that came with a vertex has moved to another slot.
+    pub fn bring_instead(&mut self, slot: VertexId, triangle: TriangleId, by: TriangleId) {
+        let brought = &mut self.stars[slot as usize].brought;
+        let all = match list(*brought) {
+            None => &mut brought[..],
+            Some(list) => &mut self.listed.lists[list as usize],
+        };
+        if let Some(place) = all.iter_mut().find(|place| **place == triangle) {
+            *place = by;
+        }
     }
 }

@@ -21,7 +21,7 @@ impl NodeId {
 /// How a request to unfold or fold a node ended. Only [`Step::Done`] changes anything.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Step {
-    /// The node has changed its status, and the sink knows.
+    /// The node has changed its status, and the sink knows, or will after [`VertexTree::update_mesh`].
     Done,
     /// Unfolding: another node must be unfolded first, a dependency beyond structure (the nodes that bring the
     /// faces w x y z in XFastMesh; neighbours with larger ids in El-Sana & Chiang). It may be anywhere below an
@@ -182,11 +182,18 @@ pub trait VertexTree {
     /// Folds a collapsible node: the inverse of [`unfold`](Self::unfold).
     fn fold<M: MeshSink>(&mut self, node: NodeId, mesh: &mut M) -> Result<Step, TreeError>;
 
+    /// Reports what [`unfold`](Self::unfold) and [`fold`](Self::fold) have put off: the mesh can follow all changes of a frame
+    /// together at less cost than one by one. Called after the last change of a frame, whether that went well or not. Until
+    /// then the sink may be behind.
+    fn update_mesh<M: MeshSink>(&mut self, mesh: &mut M) {
+        let _ = mesh;
+    }
+
     /// Says that a boundary or a collapsible node is about to change its status: a chance to fetch what that takes into
     /// the caches. Called for steps 0, 1 and so on below [`PREPARATION`](Self::PREPARATION), each when what the step
     /// before has asked for has had the time to arrive. Changes nothing.
-    fn prepare<M: MeshSink>(&self, node: NodeId, step: usize, mesh: &M) {
-        let _ = (node, step, mesh);
+    fn prepare(&self, node: NodeId, step: usize) {
+        let _ = (node, step);
     }
     /// For how many frames ahead the engine shall foresee what changes, and say so through
     /// [`will_need`](Self::will_need): as many as it takes to fetch a page, and one more; 0 for not at all. Asked in

@@ -1,0 +1,137 @@
+//! How the mesh follows changes of status: all those of a frame together.
+//!
+//! A change reads some thirty cache lines in a chain four references long, few of which are near. One after the other, with
+//! the engine's own work between, each would wait for each. Here a change passes through steps, eight changes at a time,
+//! each step starting to read what the one before has pointed at, so that the misses of thirty-two overlap; and the code is
+//! a loop of its own that stays in the nearest cache.
+//!
+//! What a step finds out may no longer be true when the change's turn comes, as those before it have been made meanwhile.
+//! So that is checked, or only used to start reading.
+
+use super::{LeafTriangle, StarMesh};
+use crate::{MeshSink, NONE, VertexId, prefetch};
+
+/// A change of status that the mesh has yet to follow.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Change {
+    /// The leaves of the kept and the removed vertex.
+    leaves: [u32; 2],
+    /// Where the removed vertex is; `None` where it goes.
+    position: Option<[f32; 3]>,
+    /// Which of the coming triangles come with it.
+    brought: [u32; 2],
+    /// The vertices of its leaves, as far as they are shown.
+    vertices: [VertexId; 2],
+    /// The leaves shown for the far corners of the first two triangles that come.
+    far: [u32; 2],
+}
+
+impl Change {
+    fn new(leaves: [u32; 2], position: Option<[f32; 3]>, brought: [u32; 2]) -> Self {
+        Self { leaves, position, brought, vertices: [NONE; 2], far: [NONE; 2] }
+    }
+
+    #[inline(always)]
+    fn brought(self, coming: &[LeafTriangle]) -> &[LeafTriangle] {
+        &coming[self.brought[0] as usize..self.brought[1] as usize]
+    }
+}
+
+/// Changes that take a step together.
+const TOGETHER: usize = 8;
+
+/// Steps before a change is made.
+const STEPS: usize = 4;
+
+impl StarMesh {
+    /// A node has been unfolded: the vertex of leaf `removed` comes back, at `position` in object space, beside that of leaf
+    /// `kept`, and with it the triangles `brought`. The mesh follows at the next [`update`](Self::update).
+    #[inline]
+    pub fn split(
+        &mut self,
+        [kept, removed]: [u32; 2],
+        position: [f32; 3],
+        brought: impl IntoIterator<Item = LeafTriangle>,
+    ) {
+        let start = self.coming.len() as u32;
+        self.coming.extend(brought);
+        let brought = [start, self.coming.len() as u32];
+        self.changes.push(Change::new([kept, removed], Some(position), brought));
+    }
+
+    /// A node has been folded: the inverse of [`split`](Self::split).
+    #[inline]
+    pub fn merge(&mut self, [kept, removed]: [u32; 2]) {
+        self.changes.push(Change::new([kept, removed], None, [0; 2]));
+    }
+
+    /// Follows the changes since the last call, in their order, and reports what they change.
+    pub fn update<M: MeshSink>(&mut self, mesh: &mut M) {
+        let mut changes = std::mem::take(&mut self.changes);
+        let coming = std::mem::take(&mut self.coming);
+        let count = changes.len();
+        for start in (0..count + STEPS * TOGETHER).step_by(TOGETHER) {
+            // Those that take a step while those of step 0 start at `start`.
+            let of_step = |step: usize| {
+                let end = (start + TOGETHER).saturating_sub(step * TOGETHER).min(count);
+                start.saturating_sub(step * TOGETHER).min(count)..end
+            };
+            for change in &changes[of_step(0)] {
+                change.leaves.iter().for_each(|&leaf| self.vertex_of_leaf.prefetch(leaf));
+                self.shown.prefetch(change.leaves[1]);
+            }
+            for change in &mut changes[of_step(1)] {
+                change.vertices = change.leaves.map(|leaf| self.vertex_of_leaf.get(leaf));
+                change.vertices.iter().for_each(|&vertex| self.stars.prefetch(vertex));
+                for triangle in change.brought(&coming) {
+                    self.shown.prefetch(triangle.far_leaf());
+                }
+            }
+            for change in &mut changes[of_step(2)] {
+                let splits = change.position.is_some();
+                let star = change.vertices[usize::from(!splits)];
+                for corner in self.stars.first(star) {
+                    prefetch(&self.triangles, corner.triangle() as usize);
+                    mesh.prefetch(corner.triangle());
+                }
+                let brought = &coming[change.brought[0] as usize..change.brought[1] as usize];
+                for (far, triangle) in change.far.iter_mut().zip(brought) {
+                    *far = self.shown.at_or_below(triangle.far_leaf()).unwrap_or(NONE);
+                    self.vertex_of_leaf.prefetch(*far);
+                }
+            }
+            for change in &changes[of_step(3)] {
+                if change.position.is_some() {
+                    for far in change.far {
+                        self.stars.prefetch(self.vertex_of_leaf.get(far));
+                    }
+                } else {
+                    for &triangle in self.stars.brought(change.vertices[1]) {
+                        let vertices = self.triangles[triangle as usize].vertices;
+                        vertices.into_iter().for_each(|vertex| self.stars.prefetch(vertex));
+                    }
+                }
+            }
+            for change in &changes[of_step(STEPS)] {
+                self.make(change, change.brought(&coming), mesh);
+            }
+        }
+        (self.changes, self.coming) = (changes, coming);
+        self.changes.clear();
+        self.coming.clear();
+    }
+
+    #[inline(always)]
+    fn make<M: MeshSink>(&mut self, change: &Change, brought: &[LeafTriangle], mesh: &mut M) {
+        let &Change { leaves, position, vertices, .. } = change;
+        // A vertex may have come since, or gone and come back in another slot.
+        let vertex = |side: usize| match vertices[side] {
+            vertex if self.stars.shows(vertex, leaves[side]) => vertex,
+            _ => self.vertex_of_leaf.get(leaves[side]),
+        };
+        match position {
+            Some(position) => self.split_vertex(vertex(0), leaves[1], position, brought, mesh),
+            None => self.merge_vertex(vertex(0), vertex(1), leaves[1], mesh),
+        }
+    }
+}
