@@ -11,6 +11,7 @@ mod hierarchy;
 mod input;
 mod path;
 mod progress;
+mod values;
 
 use std::io::Write;
 use std::process::ExitCode;

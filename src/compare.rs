@@ -11,142 +11,36 @@
 //! replay.
 
 pub mod csv;
+mod error;
+mod opening;
+mod options;
 mod replay;
 mod scene;
 
 use std::ops::{ControlFlow, Range};
 use std::sync::Arc;
-use std::time::Duration;
 
 use detail_block::XfmTree;
 use in_memory::{Hierarchy, InMemoryTree};
 use meta_node::{Dependencies, MetaNodeTree};
-use mt_partition::{CacheMode, Memory, MtTree};
-use vertex_tree::simulated::Simulated;
-use vertex_tree::{CollapseLog, LogError, Mesh, NullSink, Prefetch, TreeError, VertexTree};
+use mt_partition::MtTree;
+use vertex_tree::{CollapseLog, Mesh, NullSink, Prefetch, TreeError, VertexTree};
 
+pub use self::error::{CompareError, WrongCut};
+use self::opening::Opening;
+pub use self::options::{Options, Pace, Paging};
 use self::replay::Replay;
 pub use self::scene::replay_scene;
 use crate::active_mesh::ActiveMesh;
 use crate::brute_force::{BruteForce, unfold_all};
-use crate::budget::{Budget, WorkCap};
-use crate::criterion::Criterion;
 use crate::engine::{Engine, FrameReport, Settings};
 use crate::motion::Speed;
-use crate::objects::StoredSceneError;
-use crate::oracle::{Difference, Oracle};
+use crate::oracle::Oracle;
 use crate::path::Path;
 use crate::progress::Progress;
 use crate::refine::Strategy;
-use crate::settled::Settled;
 use crate::store::{Backend, Store, StoreError};
-use crate::view::{View, theta_of_pixels};
-
-/// What to replay, and how.
-#[derive(Clone, Debug, PartialEq)]
-pub struct Options {
-    /// In this order.
-    pub strategies: Vec<Strategy>,
-    /// What "coarse" means.
-    pub criterion: Criterion,
-    /// Whether what is seen from behind stays coarse, see [`Settings::normal_cone`].
-    pub normal_cone: bool,
-    /// Tolerance as a share of half the image's height.
-    pub theta: f64,
-    /// What a frame may cost.
-    pub budget: Budget,
-    /// What a frame may do.
-    pub work_cap: WorkCap,
-    /// Full speed of the eye, in object units a frame; by default the path's 99th percentile.
-    pub rho: Option<f64>,
-    /// Full speed of turning, in radians a frame; by default the path's 99th percentile.
-    pub omega: Option<f64>,
-    /// Compare every frame of every exact strategy with the oracle.
-    pub check: bool,
-    /// What backends may use.
-    pub paging: Paging,
-    /// What fetches pages ahead, each in a replay of its own.
-    pub prefetch: Vec<Prefetch>,
-    /// How time passes.
-    pub pace: Pace,
-}
-
-/// How time passes in a replay.
-#[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub enum Pace {
-    /// Each frame waits until it has all that it asks for.
-    #[default]
-    Settled,
-    /// So much virtual time passes from frame to frame, for a simulated store too.
-    Simulated(Duration, Simulated),
-    /// Frames come so much time after each other, and the store is the real one.
-    WallClock(Duration),
-}
-
-/// What a backend that pages may use, and how.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct Paging {
-    /// Bytes of pages in memory that are never exceeded.
-    pub page_memory: u64,
-    /// For detail blocks: bytes beyond which those are removed that have not been used for long.
-    pub soft_quota: u64,
-    /// For multi-triangulations: what is read at once, and what is kept.
-    pub cache: CacheMode,
-    /// For meta-nodes: what is done about neighbours that are too coarse or too fine.
-    pub dependencies: Dependencies,
-}
-
-impl Paging {
-    /// Memory for everything.
-    pub const UNLIMITED: Self = Self {
-        page_memory: u64::MAX,
-        soft_quota: u64::MAX,
-        cache: CacheMode::PC,
-        dependencies: Dependencies::Off,
-    };
-}
-
-impl Default for Paging {
-    /// [`Paging::UNLIMITED`].
-    fn default() -> Self {
-        Self::UNLIMITED
-    }
-}
-
-impl Default for Options {
-    /// Every strategy, screen error of 1 pixel at 1080 lines, no budget, speeds of the path, no check.
-    fn default() -> Self {
-        Self {
-            strategies: Strategy::ALL.to_vec(),
-            criterion: Criterion::default(),
-            normal_cone: false,
-            theta: theta_of_pixels(1.0, 1080),
-            budget: Budget::None,
-            work_cap: WorkCap::None,
-            rho: None,
-            omega: None,
-            check: false,
-            paging: Paging::default(),
-            prefetch: vec![Prefetch::Paper],
-            pace: Pace::Settled,
-        }
-    }
-}
-
-impl Options {
-    /// How an engine refines along a path of this declared speed.
-    fn settings(&self, strategy: Strategy, speed: &Speed) -> Settings {
-        Settings {
-            strategy,
-            criterion: self.criterion,
-            normal_cone: self.normal_cone,
-            rho: speed.rho,
-            omega: speed.omega,
-            budget: self.budget,
-            work_cap: self.work_cap,
-        }
-    }
-}
+use crate::view::View;
 
 /// One frame of a replay.
 #[derive(Clone, Copy, Debug)]
@@ -178,117 +72,6 @@ pub struct Run {
     pub rows: Vec<Row>,
 }
 
-/// A comparison stopped.
-#[derive(Debug, thiserror::Error)]
-#[non_exhaustive]
-pub enum CompareError {
-    /// The hierarchy is damaged.
-    #[error("{scene}: {source}")]
-    Log {
-        /// What was looked at.
-        scene: String,
-        /// What does not fit.
-        source: LogError,
-    },
-    /// A tree can not be opened.
-    #[error("{scene}: {source}")]
-    Store {
-        /// What was looked at.
-        scene: String,
-        /// Why.
-        source: StoreError,
-    },
-    /// A strategy's cut is not that of brute force over the backend's own nodes.
-    #[error(
-        "{scene}, path {path}, frame {frame}: {strategy} over {backend} differs from brute force in {wrong} nodes"
-    )]
-    Differs {
-        /// What was looked at.
-        scene: String,
-        /// The path.
-        path: String,
-        /// Number of the frame in the path.
-        frame: usize,
-        /// The strategy.
-        strategy: &'static str,
-        /// The backend.
-        backend: &'static str,
-        /// How many nodes.
-        wrong: u64,
-    },
-    /// The backend can not go on.
-    #[error("{scene}: {source}")]
-    Tree {
-        /// What was looked at.
-        scene: String,
-        /// Why.
-        source: TreeError,
-    },
-    /// A scene of several objects can not be opened, or one of its trees can not go on.
-    #[error("{scene}: {source}")]
-    Objects {
-        /// The scene.
-        scene: String,
-        /// Why.
-        source: StoredSceneError,
-    },
-    /// Two strategies have different cuts of a scene of several objects.
-    #[error("{scene}, path {path}, frame {frame}: {} and {} have different cuts", strategies[0], strategies[1])]
-    Disagree {
-        /// The scene.
-        scene: String,
-        /// The path.
-        path: String,
-        /// Number of the frame in the path.
-        frame: usize,
-        /// The strategies.
-        strategies: [&'static str; 2],
-    },
-    /// A strategy's cut is not the oracle's.
-    #[error("{0}")]
-    Wrong(Box<WrongCut>),
-}
-
-/// The first node found to differ from the oracle, and where it stands in the first view.
-#[derive(Debug)]
-pub struct WrongCut {
-    scene: String,
-    path: String,
-    frame: usize,
-    strategy: Strategy,
-    difference: Difference,
-    views: Vec<View>,
-    criterion: Criterion,
-}
-
-impl std::fmt::Display for WrongCut {
-    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
-        let Difference { node, bounds, active, count } = self.difference;
-        let status = |active| if active { "unfolded" } else { "folded" };
-        write!(
-            f,
-            "{}, path {}, frame {}: {} has node {node} {}, the oracle {}; {count} nodes differ; sphere at {:?}, radius \
-             {}, eps {}",
-            self.scene,
-            self.path,
-            self.frame,
-            self.strategy.name(),
-            status(!active),
-            status(active),
-            bounds.center,
-            bounds.radius,
-            bounds.eps,
-        )?;
-        for view in &self.views {
-            let distance = view.eye.distance(glam::DVec3::from(bounds.center.map(f64::from)));
-            let reach = self.criterion.reach_distance(&bounds, view.k);
-            let unfold = self.criterion.unfold_for(view, &bounds);
-            write!(f, "; at distance {distance}, coarse within {reach}, wanted: {unfold}")?;
-        }
-        Ok(())
-    }
-}
-
 /// A hierarchy with what is needed to replay paths through it.
 pub struct Subject {
     name: String,
@@ -304,52 +87,6 @@ pub const OUTLINE: usize = 1 << 18;
 enum Check {
     Log(Oracle),
     Nodes(BruteForce),
-}
-
-/// How trees are opened.
-#[derive(Clone, Copy)]
-struct Opening {
-    paging: Paging,
-    prefetch: Prefetch,
-    pace: Pace,
-}
-
-impl Opening {
-    /// With memory for everything, and time.
-    const SETTLED: Self = Self { paging: Paging::UNLIMITED, prefetch: Prefetch::None, pace: Pace::Settled };
-
-    fn simulated(&self) -> Option<Simulated> {
-        match self.pace {
-            Pace::Simulated(_, store) => Some(store),
-            Pace::Settled | Pace::WallClock(_) => None,
-        }
-    }
-
-    fn meta_node(&self) -> meta_node::Settings {
-        let Paging { page_memory, dependencies, .. } = self.paging;
-        let io = self.simulated().map_or(meta_node::Io::Thread, meta_node::Io::Simulated);
-        meta_node::Settings { page_memory, dependencies, prefetch: self.prefetch, io, ..Default::default() }
-    }
-
-    fn detail_block(&self) -> detail_block::Settings {
-        let Paging { page_memory: hard_quota, soft_quota, .. } = self.paging;
-        let soft_quota = soft_quota.min(hard_quota);
-        let io = self.simulated().map_or(detail_block::Io::Background, detail_block::Io::Simulated);
-        detail_block::Settings { soft_quota, hard_quota, prefetch: self.prefetch, io, ..Default::default() }
-    }
-
-    fn mt_partition(&self) -> mt_partition::Settings {
-        let Paging { page_memory, cache, .. } = self.paging;
-        let reader = self.simulated().map(mt_partition::Reader::simulated);
-        mt_partition::Settings { cache, memory: Memory::new(page_memory), reader, prefetch: self.prefetch }
-    }
-
-    fn wrap<T: VertexTree>(&self, tree: T) -> Settled<T> {
-        match self.pace {
-            Pace::Settled => Settled::new(tree),
-            Pace::Simulated(..) | Pace::WallClock(_) => Settled::in_real_time(tree),
-        }
-    }
 }
 
 /// Calls a generic function with a way to open trees of the subject's backend.
@@ -543,7 +280,7 @@ impl Subject {
             check = Some(self.new_check()?);
         }
         let is_checked = |s: Strategy| options.check || !s.is_exact();
-        let speed = declared_speed(path, options);
+        let speed = options.declared_speed(path);
         let views: Vec<View> =
             frames.clone().map(|frame| View::new(&path.camera(frame), options.theta)).collect();
         // Without pages there is nothing to fetch.
@@ -589,17 +326,5 @@ impl Subject {
         }
         self.check = check;
         Ok(runs)
-    }
-}
-
-/// The full speed that is declared for a path: what the options say, otherwise the 99th percentile of its motion, or
-/// where that is nothing, the largest.
-fn declared_speed(path: &Path, options: &Options) -> Speed {
-    let (usual, largest) = (path.motion_percentile(99.0), path.motion_percentile(100.0));
-    let or = |usual: f64, largest: f64| if usual > 0.0 { usual } else { largest };
-    Speed {
-        rho: options.rho.unwrap_or_else(|| or(usual.rho, largest.rho)),
-        omega: options.omega.unwrap_or_else(|| or(usual.omega, largest.omega)),
-        kappa: 0.0,
     }
 }

@@ -10,6 +10,7 @@ use mt_partition::CacheMode;
 use vertex_tree::Prefetch;
 use vertex_tree::simulated::Simulated;
 
+use super::values::{backend, cache, duration, frames, positive, prefetch, size, strategy, work_cap};
 use crate::budget::WorkCap;
 use crate::compare::Pace;
 use crate::criterion::Criterion;
@@ -389,83 +390,6 @@ pub(super) struct Deviation {
     pub refinement: Refinement,
 }
 
-fn positive(text: &str) -> Result<f64, String> {
-    match text.parse::<f64>() {
-        Ok(x) if x > 0.0 && x.is_finite() => Ok(x),
-        _ => Err("a number above 0 is expected".to_owned()),
-    }
-}
-
-/// A number of bytes, or of units of 2^10, 2^20 or 2^30 bytes with the letter K, M or G.
-fn size(text: &str) -> Result<u64, String> {
-    let expected = || "a size such as 256M, 1G or a number of bytes is expected".to_owned();
-    let (number, shift) = [('K', 10), ('M', 20), ('G', 30)]
-        .iter()
-        .find_map(|&(unit, shift)| Some((text.strip_suffix(unit)?, shift)))
-        .unwrap_or((text, 0));
-    if !number.bytes().all(|b| b.is_ascii_digit()) {
-        return Err(expected());
-    }
-    let number: u64 = number.parse().map_err(|_| expected())?;
-    match number.checked_mul(1 << shift) {
-        Some(bytes) if bytes > 0 => Ok(bytes),
-        _ => Err(expected()),
-    }
-}
-
-fn strategy(text: &str) -> Result<Strategy, String> {
-    Strategy::ALL
-        .into_iter()
-        .find(|s| s.name() == text)
-        .ok_or_else(|| format!("one of {} is expected", Strategy::ALL.map(Strategy::name).join(", ")))
-}
-
-/// `A..B`, either of which may be missing.
-fn frames(text: &str) -> Result<Range<usize>, String> {
-    let expected = || "frames A..B with A less than B are expected".to_owned();
-    let (a, b) = text.split_once("..").ok_or_else(expected)?;
-    let bound = |text: &str, default| if text.is_empty() { Ok(default) } else { text.parse() };
-    let range = bound(a, 0).map_err(|_| expected())?..bound(b, usize::MAX).map_err(|_| expected())?;
-    if range.is_empty() { Err(expected()) } else { Ok(range) }
-}
-
-/// A number with the unit s, ms or us.
-fn duration(text: &str) -> Result<Duration, String> {
-    let expected = || "a time such as 5ms, 0.01s or 500us is expected".to_owned();
-    let (number, scale) = [("ms", 1e-3), ("us", 1e-6), ("s", 1.0)]
-        .iter()
-        .find_map(|&(unit, scale)| Some((text.strip_suffix(unit)?, scale)))
-        .ok_or_else(expected)?;
-    match number.parse::<f64>() {
-        Ok(x) if x > 0.0 && x < 1e9 => Ok(Duration::from_secs_f64(x * scale)),
-        _ => Err(expected()),
-    }
-}
-
-fn backend(text: &str) -> Result<Backend, String> {
-    let names = || format!("one of {} is expected", Backend::ALL.map(Backend::name).join(", "));
-    Backend::ALL.into_iter().find(|b| b.name() == text).ok_or_else(names)
-}
-
-fn prefetch(text: &str) -> Result<Prefetch, String> {
-    let names = || format!("one of {} is expected", Prefetch::ALL.map(Prefetch::name).join(", "));
-    Prefetch::ALL.into_iter().find(|prefetch| prefetch.name() == text).ok_or_else(names)
-}
-
-fn cache(text: &str) -> Result<CacheMode, String> {
-    let names = || format!("one of {} is expected", CacheMode::ALL.map(CacheMode::name).join(", "));
-    CacheMode::ALL.into_iter().find(|mode| mode.name() == text).ok_or_else(names)
-}
-
-/// A number of changes, or a time.
-fn work_cap(text: &str) -> Result<WorkCap, String> {
-    let expected = |_| "a number of changes, or a time such as 200us, is expected".to_owned();
-    match text.parse() {
-        Ok(changes) => Ok(WorkCap::Changes(changes)),
-        Err(_) => duration(text).map(WorkCap::Time).map_err(expected),
-    }
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -474,33 +398,5 @@ mod tests {
     #[test]
     fn arguments_are_consistent() {
         Arguments::command().debug_assert();
-    }
-
-    #[test]
-    fn values_are_read_as_documented() {
-        assert_eq!(size("4096"), Ok(4096));
-        assert_eq!((size("64K"), size("256M"), size("1G")), (Ok(64 << 10), Ok(256 << 20), Ok(1 << 30)));
-        for wrong in ["", "0", "M", "-1", "1.5G", "+3K", "1T", "99999999999G", "64k"] {
-            assert!(size(wrong).is_err(), "{wrong}");
-        }
-        assert_eq!(frames("3..7"), Ok(3..7));
-        assert_eq!(frames("..7"), Ok(0..7));
-        assert!(frames("7..3").is_err());
-        assert!(frames("3").is_err());
-        assert_eq!(duration("5ms"), Ok(Duration::from_millis(5)));
-        assert_eq!(duration("0.5s"), Ok(Duration::from_millis(500)));
-        assert!(duration("5").is_err());
-        assert_eq!(work_cap("100"), Ok(WorkCap::Changes(100)));
-        assert_eq!(work_cap("200us"), Ok(WorkCap::Time(Duration::from_micros(200))));
-        assert!(work_cap("-1").is_err());
-        assert_eq!(size("65536"), Ok(65536));
-        assert_eq!(size("64K"), Ok(65536));
-        assert_eq!(size("1G"), Ok(1 << 30));
-        assert!(size("1T").is_err() && size("0").is_err() && size("99999999999G").is_err());
-        assert_eq!(backend("meta-node"), Ok(Backend::MetaNode));
-        assert_eq!(cache("p-cc"), Ok(CacheMode::PCc));
-        assert!(positive("NaN").is_err());
-        assert_eq!(strategy("event"), Ok(Strategy::Event));
-        assert!(strategy("best").is_err());
     }
 }

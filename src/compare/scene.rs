@@ -5,7 +5,7 @@
 
 use std::ops::Range;
 
-use super::{CompareError, Opening, Options, Pace, Row, Run, declared_speed};
+use super::{CompareError, Opening, Options, Pace, Row, Run};
 use crate::objects::StoredScene;
 use crate::path::Path;
 use crate::progress::Progress;
@@ -27,7 +27,7 @@ pub fn replay_scene(
     progress: Progress,
 ) -> Result<Vec<Run>, CompareError> {
     let wrap = |source| CompareError::Objects { scene: name.to_owned(), source };
-    let speed = declared_speed(path, options);
+    let speed = options.declared_speed(path);
     let views: Vec<View> =
         frames.clone().map(|frame| View::new(&path.camera(frame), options.theta)).collect();
     let total = (options.prefetch.len() * options.strategies.len()) as u64;
