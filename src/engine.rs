@@ -8,6 +8,7 @@
 //! Everything here runs on the caller's thread. A backend may have threads of its own; no call waits for them.
 
 mod changes;
+mod waiting;
 
 use std::collections::BinaryHeap;
 use std::time::{Duration, Instant};
@@ -15,6 +16,7 @@ use std::time::{Duration, Instant};
 use vertex_tree::{MeshSink, NodeId, PageStats, TreeError, VertexTree};
 
 use self::changes::{Counts, Noted, Pending, Steps, Urgent};
+pub(crate) use self::waiting::Waiting;
 use crate::budget::{Budget, Steering, WorkCap};
 use crate::criterion::Criterion;
 use crate::foresight::{Foresight, Watched};
@@ -111,7 +113,7 @@ pub struct FrameReport {
     pub carried: u64,
     /// Wanted changes that a rule of the backend's own forbade, see [`Step::Blocked`](vertex_tree::Step::Blocked).
     pub blocked: u64,
-    /// Wanted changes that the backend refused for want of a page.
+    /// Nodes whose pages were missing for wanted changes: refused in this frame, or before and still waited for.
     pub misses: u64,
     /// Nodes that the backend was told to expect a change of, see [`VertexTree::will_need`].
     pub foreseen: u64,
@@ -170,6 +172,7 @@ pub struct Engine<T, M> {
     flips: Flips,
     stack: Vec<Pending>,
     missing: Vec<NodeId>,
+    waiting: Waiting,
     blocked: Vec<Noted>,
     forbidden: Vec<NodeId>,
     still_needed: Vec<Noted>,
@@ -217,6 +220,7 @@ impl<T: VertexTree, M: MeshSink> Engine<T, M> {
             flips: Flips::default(),
             stack: Vec::new(),
             missing: Vec::new(),
+            waiting: Waiting::default(),
             blocked: Vec::new(),
             forbidden: Vec::new(),
             still_needed: Vec::new(),
@@ -261,7 +265,7 @@ impl<T: VertexTree, M: MeshSink> Engine<T, M> {
         &self.views
     }
 
-    /// The nodes whose change the backend refused in the last frame for want of a page, in ascending order.
+    /// The nodes whose pages were missing for a change in the last frame, in ascending order.
     pub fn missing(&self) -> &[NodeId] {
         &self.missing
     }
@@ -299,7 +303,6 @@ impl<T: VertexTree, M: MeshSink> Engine<T, M> {
     /// What the backend reports; the front then is a valid one between the old and the new.
     pub fn advance(&mut self, views: &[View]) -> Result<FrameReport, TreeError> {
         let start = Instant::now();
-        self.arrived.clear();
         self.tree.begin_frame(&mut self.arrived)?;
 
         std::mem::swap(&mut self.before, &mut self.views);
@@ -336,6 +339,7 @@ impl<T: VertexTree, M: MeshSink> Engine<T, M> {
                 frame: &frame,
                 stack: &mut self.stack,
                 missing: &mut self.missing,
+                waiting: &mut self.waiting,
                 blocked: &mut self.blocked,
                 forbidden: &mut self.forbidden,
                 still_needed: &mut self.still_needed,
@@ -345,7 +349,8 @@ impl<T: VertexTree, M: MeshSink> Engine<T, M> {
                 counts: Counts::default(),
                 tests: 0,
             };
-            let applied = step.carry_out(&self.flips, self.settings.work_cap, found, &mut self.urgent);
+            let (cap, urgent) = (self.settings.work_cap, &mut self.urgent);
+            let applied = step.carry_out(&self.flips, &mut self.arrived, cap, found, urgent);
             (applied, step.counts, self.flips.tests + step.tests)
         });
         self.tree.update_mesh(&mut self.mesh);
@@ -365,7 +370,8 @@ impl<T: VertexTree, M: MeshSink> Engine<T, M> {
             }
             look_ahead => {
                 let unfinished = misses > 0 || counts.carried > 0;
-                let watched = Watched { front: &self.front, finder: &self.finder };
+                let (front, finder) = (&self.front, &self.finder);
+                let watched = Watched { front, finder, waiting: &self.waiting };
                 self.foresight.look(&mut self.tree, watched, &frame, &self.before, look_ahead, unfinished)
             }
         };

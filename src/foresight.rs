@@ -20,6 +20,7 @@ use vertex_tree::{Bounds, NodeId, VertexTree};
 
 use self::candidates::Candidates;
 use self::trend::Trend;
+use crate::engine::Waiting;
 use crate::filter::{Lenses, MOST_VIEWS};
 use crate::front::{Front, Slot};
 use crate::queue::Kind;
@@ -43,11 +44,12 @@ enum Change {
     Fold(Slot),
 }
 
-/// What a strategy knows at the end of a frame.
+/// What is known at the end of a frame of the nodes that can change next: what a strategy watches, and what waits.
 #[derive(Clone, Copy)]
 pub(crate) struct Watched<'a> {
     pub front: &'a Front,
     pub finder: &'a Finder,
+    pub waiting: &'a Waiting,
 }
 
 /// What is kept from frame to frame, above all allocations.

@@ -48,7 +48,7 @@ pub(crate) struct Record {
     /// While active: the pair of the children linked below the node, 0 for none. With [`MANY`], an index into
     /// [`Front::many`] instead.
     children: u32,
-    /// [`ACTIVE`], [`MANY`], and in the other bits, of an active node, how many structural children are active, of a
+    /// [`ACTIVE`], [`MANY`], [`WAITING`], and in the other bits, of an active node, how many structural children are active, of a
     /// folded one, how many structural parents are not: a boundary node has none.
     status: u32,
 }
@@ -76,6 +76,12 @@ impl Record {
     pub fn is_boundary(&self) -> bool {
         self.status & (ACTIVE | COUNT) == 0
     }
+
+    /// Whether a change of the node's status is set aside until a page has come.
+    #[inline(always)]
+    pub fn is_waiting(&self) -> bool {
+        self.status & WAITING != 0
+    }
 }
 
 /// The records of two siblings, in a cache line.
@@ -85,7 +91,8 @@ pub(crate) struct Pair(pub [Record; 2]);
 
 const ACTIVE: u32 = 1 << 31;
 const MANY: u32 = 1 << 30;
-const COUNT: u32 = MANY - 1;
+const WAITING: u32 = 1 << 29;
+const COUNT: u32 = WAITING - 1;
 
 /// The nodes in play.
 pub struct Front {
@@ -161,6 +168,18 @@ impl Front {
     #[inline(always)]
     pub(crate) fn bounds(&self, slot: Slot) -> Bounds {
         self.record(slot).bounds
+    }
+
+    #[inline(always)]
+    pub(crate) fn is_waiting(&self, slot: Slot) -> bool {
+        self.record(slot).is_waiting()
+    }
+
+    /// Sets a change of a node aside, or not any more. When the node has changed, or has come into play again, it is not.
+    #[inline(always)]
+    pub(crate) fn set_waiting(&mut self, slot: Slot, is_waiting: bool) {
+        let record = self.record_mut(slot);
+        record.status = if is_waiting { record.status | WAITING } else { record.status & !WAITING };
     }
 
     /// Starts to read a record into the cache, and the place that says what is above.
@@ -388,12 +407,12 @@ impl Front {
         }
     }
 
-    /// Calls `f` with every boundary node and every collapsible node.
+    /// Calls `f` with every boundary node and every collapsible node whose change is not set aside.
     pub(crate) fn for_each_watched(&self, mut f: impl FnMut(Slot, Kind, &Bounds)) {
         for (pair, Pair(records)) in (0..).zip(&self.pairs) {
             for (side, record) in (0..).zip(records) {
                 let kind = if record.is_active() { Kind::Fold } else { Kind::Unfold };
-                if record.is_boundary() || record.is_collapsible() {
+                if (record.is_boundary() || record.is_collapsible()) && !record.is_waiting() {
                     f(Slot(2 * pair + side), kind, &record.bounds);
                 }
             }

@@ -7,6 +7,9 @@ use vertex_tree::{Bounds, MeshSink, NodeId, NormalCone, PageStats, Step, TreeErr
 pub struct Settled<T> {
     tree: T,
     waits: bool,
+    /// Nodes that were refused all the same. What has come for others while one was waited for is not told apart, so all
+    /// of them can be asked again in the next frame.
+    refused: Vec<NodeId>,
 }
 
 /// A change that is refused more often is left to the next frame.
@@ -16,17 +19,18 @@ impl<T: VertexTree> Settled<T> {
     /// A backend that waits.
     #[must_use]
     pub fn new(tree: T) -> Self {
-        Self { tree, waits: true }
+        Self { tree, waits: true, refused: Vec::new() }
     }
 
     /// A backend that does not, and is as it would be without this: so that what replays a path need not care.
     #[must_use]
     pub fn in_real_time(tree: T) -> Self {
-        Self { tree, waits: false }
+        Self { tree, waits: false, refused: Vec::new() }
     }
 
     fn insist(
         &mut self,
+        node: NodeId,
         mut change: impl FnMut(&mut T) -> Result<Step, TreeError>,
     ) -> Result<Step, TreeError> {
         for _ in 0..PATIENCE {
@@ -38,6 +42,7 @@ impl<T: VertexTree> Settled<T> {
                 step => return Ok(step),
             }
         }
+        self.refused.push(node);
         Ok(Step::NotResident)
     }
 }
@@ -99,16 +104,20 @@ impl<T: VertexTree> VertexTree for Settled<T> {
         self.tree.base_mesh(mesh)
     }
     fn unfold<M: MeshSink>(&mut self, node: NodeId, mesh: &mut M) -> Result<Step, TreeError> {
-        self.insist(|tree| tree.unfold(node, mesh))
+        self.insist(node, |tree| tree.unfold(node, mesh))
     }
     fn fold<M: MeshSink>(&mut self, node: NodeId, mesh: &mut M) -> Result<Step, TreeError> {
-        self.insist(|tree| tree.fold(node, mesh))
+        self.insist(node, |tree| tree.fold(node, mesh))
     }
     fn update_mesh<M: MeshSink>(&mut self, mesh: &mut M) {
         self.tree.update_mesh(mesh);
     }
     fn begin_frame(&mut self, arrived: &mut Vec<NodeId>) -> Result<(), TreeError> {
+        arrived.append(&mut self.refused);
         self.tree.begin_frame(arrived)
+    }
+    fn give_up(&mut self, node: NodeId) {
+        self.tree.give_up(node);
     }
     fn settle(&mut self) -> Result<(), TreeError> {
         self.tree.settle()

@@ -8,6 +8,7 @@ use std::time::Instant;
 
 use vertex_tree::{MeshSink, NodeId, Step, TreeError, VertexTree};
 
+use super::waiting::Waiting;
 use crate::budget::{FOLDING_SHARE, WorkCap};
 use crate::front::{Front, Record, Slot};
 use crate::queue::Kind;
@@ -70,8 +71,10 @@ pub(super) struct Steps<'a, T, M, F> {
     pub finder: &'a mut F,
     pub frame: &'a Frame<'a>,
     pub stack: &'a mut Vec<Pending>,
-    /// Nodes whose change was refused for want of a page; some more than once.
+    /// Nodes whose page is missing for a change; some more than once.
     pub missing: &'a mut Vec<NodeId>,
+    /// Changes that wait for pages.
+    pub waiting: &'a mut Waiting,
     /// Nodes whose change a rule of the backend's own forbade; some more than once.
     pub forbidden: &'a mut Vec<NodeId>,
     /// The same while others may yet make them possible.
@@ -89,10 +92,11 @@ pub(super) struct Steps<'a, T, M, F> {
 }
 
 impl<T: VertexTree, M: MeshSink, F: Watch> Steps<'_, T, M, F> {
-    /// Carries out what a strategy has found, within a cap on work that began at `start`.
+    /// Carries out what a strategy has found and what has waited for `arrived`, within a cap on work that began at `start`.
     pub fn carry_out(
         &mut self,
         flips: &Flips,
+        arrived: &mut Vec<NodeId>,
         cap: WorkCap,
         start: Instant,
         urgent: &mut [BinaryHeap<Urgent>; 2],
@@ -102,6 +106,7 @@ impl<T: VertexTree, M: MeshSink, F: Watch> Steps<'_, T, M, F> {
         self.forbidden.clear();
         note(self.front, &flips.fold, self.folding);
         note(self.front, &flips.unfold, self.unfolding);
+        self.resume(arrived);
         let applied = match cap {
             WorkCap::None => self.apply(),
             cap => self.apply_within(cap, start, urgent),
@@ -297,8 +302,7 @@ impl<T: VertexTree, M: MeshSink, F: Watch> Steps<'_, T, M, F> {
         match self.tree.fold(node, self.mesh)? {
             Step::Done => {}
             Step::NotResident => {
-                self.missing.push(node);
-                self.refused(slot, Kind::Fold);
+                self.wait_for((slot, node), Kind::Fold, node);
                 return Ok(());
             }
             Step::Blocked => {
@@ -386,7 +390,7 @@ impl<T: VertexTree, M: MeshSink, F: Watch> Steps<'_, T, M, F> {
                 let is_folded = |p: &NodeId| !front.record(front.find(tree, *p)).is_active();
                 self.stack.extend(tree.parents(node).filter(is_folded).map(Pending::needed));
                 if (above..self.stack.len()).any(|at| self.waits(self.stack[at].node)) {
-                    self.give_up();
+                    self.give_up(None);
                 } else {
                     self.stack[above - 1].waits = true;
                 }
@@ -416,10 +420,11 @@ impl<T: VertexTree, M: MeshSink, F: Watch> Steps<'_, T, M, F> {
                 self.stack.push(Pending::needed(other));
                 return;
             }
+            Step::NotResident => return self.give_up(Some(node)),
             Step::Blocked => self.blocked.push((slot, node)),
-            Step::Done | Step::Needs(_) | Step::NotResident | Step::StillNeeded => self.missing.push(node),
+            Step::Done | Step::Needs(_) | Step::StillNeeded => self.missing.push(node),
         }
-        self.give_up();
+        self.give_up(None);
     }
 
     /// The backend has unfolded a node.
@@ -487,12 +492,18 @@ impl<T: VertexTree, M: MeshSink, F: Watch> Steps<'_, T, M, F> {
         self.stack[last..].iter().any(|pending| pending.waits && pending.node == node)
     }
 
-    /// The node on top of the stack can not be unfolded in this frame, and with it nothing that waits for it.
-    fn give_up(&mut self) {
+    /// The node on top of the stack can not be unfolded in this frame, and with it nothing that waits for it. `awaited` is
+    /// the node whose page is missing, if that is why.
+    fn give_up(&mut self, awaited: Option<NodeId>) {
         while let Some(Pending { slot, node, needed, .. }) = self.stack.pop() {
             let slot = if slot == Slot::NONE { self.front.find(self.tree, node) } else { slot };
             if is_boundary(self.front, (slot, node)) {
-                self.refused(slot, Kind::Unfold);
+                match awaited {
+                    None => self.refused(slot, Kind::Unfold),
+                    // What is only needed stays what it is; what needs it asks again.
+                    Some(_) if needed => {}
+                    Some(awaited) => self.wait_for((slot, node), Kind::Unfold, awaited),
+                }
             }
             if !needed {
                 break;

@@ -50,7 +50,7 @@ impl Candidates {
     pub fn find(
         &mut self,
         ahead: &Ahead,
-        Watched { front, finder }: Watched,
+        Watched { front, finder, waiting }: Watched,
         agenda: &mut [Vec<Change>; MOST_INSTANTS],
     ) {
         let Some(now) = Lenses::new(ahead.frame.criterion, ahead.frame.views) else { return };
@@ -72,6 +72,10 @@ impl Candidates {
                 sift(gathered, kind, ahead, &glasses, &mut put);
             }
         };
+        // What is refused now is wrong at the next instant too, if it is still in play.
+        for change in waiting.changes().iter().filter(|change| front.is_waiting(change.slot)) {
+            take(change.slot, change.kind, &front.bounds(change.slot));
+        }
         match finder {
             Finder::Event(event) => {
                 let travels =

@@ -38,7 +38,7 @@ impl TopDown {
                 front.descend(record, &mut self.stack);
                 let slot = Slot(2 * pair + side);
                 let (wanted, active) = (unfold(slot, &record.bounds), record.is_active());
-                if wanted != active {
+                if wanted != active && !record.is_waiting() {
                     if wanted {
                         if record.is_boundary() {
                             flips.unfold.push(slot);
@@ -53,7 +53,7 @@ impl TopDown {
     }
 }
 
-/// It looks at everything anyway.
+/// It looks at everything anyway, but for changes that wait, which the front tells.
 impl Watch for TopDown {
     #[inline(always)]
     fn watch(&mut self, _: &Frame, _: Slot, _: Kind, _: Bounds) {}

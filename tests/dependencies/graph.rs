@@ -138,10 +138,12 @@ pub enum Call {
 #[derive(Debug, Default)]
 pub struct Log {
     pub active: Vec<bool>,
-    /// Different nodes refused for want of a page in this frame.
+    /// Nodes refused for want of a page, in this frame or before, until it comes or is not waited for any more.
     pub refused: BTreeSet<u32>,
-    /// Refusals of all frames, each node once a frame.
+    /// Refusals of all frames, each node once a frame for as long as it is waited for.
     pub refusals: u64,
+    /// How often a node was asked for again that is waited for.
+    pub in_vain: u64,
     /// Steps that something else was needed for.
     pub still_needed: u64,
     pub named: u64,
@@ -219,7 +221,8 @@ impl GraphTree {
             }
             self.arriving[n] = Some(self.frame + 1 + self.random.below(latency) as u64);
         }
-        self.log.borrow_mut().refused.insert(node.0);
+        let mut log = self.log.borrow_mut();
+        log.in_vain += u64::from(!log.refused.insert(node.0));
         false
     }
 
@@ -314,16 +317,20 @@ impl VertexTree for GraphTree {
 
     fn begin_frame(&mut self, arrived: &mut Vec<NodeId>) -> Result<(), TreeError> {
         self.frame += 1;
-        self.log.borrow_mut().refused.clear();
         self.may_fail(Call::Begin)?;
         for (n, arriving) in self.arriving.iter_mut().enumerate() {
             if arriving.is_some_and(|at| at <= self.frame) {
                 *arriving = None;
                 self.resident_until[n] = self.frame + STAYS;
+                self.log.borrow_mut().refused.remove(&(n as u32));
                 arrived.push(NodeId(n as u32));
             }
         }
         Ok(())
+    }
+
+    fn give_up(&mut self, node: NodeId) {
+        self.log.borrow_mut().refused.remove(&node.0);
     }
 
     fn end_frame(&mut self) -> Result<PageStats, TreeError> {

@@ -11,7 +11,7 @@
 use rustc_hash::FxHashMap;
 use vertex_tree::{Bounds, NodeId};
 
-use crate::loader::Run;
+use crate::loader::{Loader, Run};
 use crate::numbering::{Owner, owner};
 use crate::paging::Paging;
 
@@ -25,33 +25,12 @@ pub(crate) struct Foresight {
     /// The same, nearest first: for making room the last one is taken off.
     order: Vec<(u32, u32)>,
     withdrawn: Vec<Run>,
-    /// The frames that a read has taken from request to arrival: the most there were lately.
-    lag: f64,
 }
 
-/// Share of the lag that is left after a frame: a half after 140.
-const DECAY: f64 = 0.995;
-
-/// Frames of foresight, at least and at most.
+/// Frames of foresight, at least.
 const LEAST: u32 = 2;
-const MOST: u32 = 60;
 
 impl Foresight {
-    /// Frames that a read takes, and one more.
-    pub fn frames(&self) -> u32 {
-        (self.lag.ceil() as u32).saturating_add(1).clamp(LEAST, MOST)
-    }
-
-    /// A frame begins.
-    pub fn begin_frame(&mut self) {
-        self.lag *= DECAY;
-    }
-
-    /// A read has taken so many frames.
-    pub fn observe(&mut self, frames: u64) {
-        self.lag = self.lag.max(frames as f64);
-    }
-
     /// Whether a block is foreseen.
     #[inline]
     pub fn holds(&self, block: u32) -> bool {
@@ -68,6 +47,12 @@ impl Foresight {
 }
 
 impl Paging {
+    /// For how many frames ahead it is worth to know what will be needed.
+    pub fn look_ahead(&self) -> u32 {
+        let [missed, _] = self.loader.as_ref().map_or([0; 2], Loader::waiting);
+        self.store.frames(missed, LEAST)
+    }
+
     /// A node is expected to change in so many frames.
     pub fn foresee(&mut self, node: NodeId, frames: u32) {
         let file = &self.file;
@@ -113,13 +98,18 @@ impl Paging {
         }
         let is_any = !runs.is_empty();
         for run in runs.drain(..) {
-            self.reserved -= self.bytes_of(run);
-            for number in run.numbers() {
-                self.pending.remove(&number);
-            }
+            self.withdrawn(run);
         }
         self.foresight.withdrawn = runs;
         is_any
+    }
+
+    /// A request has been taken back.
+    pub fn withdrawn(&mut self, run: Run) {
+        self.reserved -= self.bytes_of(run);
+        for number in run.numbers() {
+            self.pending.remove(&number);
+        }
     }
 
     /// Asks for what has been named in this frame, instead of what was before.

@@ -53,6 +53,7 @@ mod surface;
 mod tree;
 mod vector;
 mod verify;
+mod waiting;
 mod well_formed;
 mod writing;
 

@@ -39,10 +39,9 @@ impl Run {
     }
 }
 
-/// A run that is wanted, and the frame in which it was: that of the demand, or, for one that was foreseen, that in which
-/// reading began.
+/// A run that is being read, and the frame in which that began.
 #[derive(Clone, Copy, Debug)]
-pub(crate) struct Request {
+pub(crate) struct Reading {
     run: Run,
     frame: u64,
 }
@@ -50,7 +49,7 @@ pub(crate) struct Request {
 /// What became of a run.
 pub(crate) struct Answer {
     pub run: Run,
-    /// See [`Request`].
+    /// See [`Reading`].
     pub frame: u64,
     /// Bytes read, 0 if reading failed.
     pub bytes: u64,
@@ -80,8 +79,8 @@ pub(crate) fn read_run(file: &XfmFile, run: Run, frame: u64, buffer: &mut Vec<u8
 /// What is wanted and has not been started, and what has been read.
 #[derive(Default)]
 struct Queue {
-    urgent: VecDeque<Request>,
-    ahead: VecDeque<Request>,
+    urgent: VecDeque<Run>,
+    ahead: VecDeque<Run>,
     done: Vec<Answer>,
     /// The tree's frame.
     frame: u64,
@@ -90,18 +89,21 @@ struct Queue {
 }
 
 impl Queue {
-    fn next(&mut self) -> Option<Request> {
-        let frame = self.frame;
-        let ahead = &mut self.ahead;
-        self.urgent.pop_front().or_else(|| Some(Request { frame, ..ahead.pop_front()? }))
+    fn next(&mut self) -> Option<Reading> {
+        let run = self.urgent.pop_front().or_else(|| self.ahead.pop_front())?;
+        Some(Reading { run, frame: self.frame })
+    }
+
+    fn take_back(&mut self, block: u32, may: impl FnOnce(Run) -> bool) -> Option<Run> {
+        let at = self.urgent.iter().position(|run| run.numbers().contains(&block))?;
+        if may(self.urgent[at]) { self.urgent.remove(at) } else { None }
     }
 
     fn hurry(&mut self, block: u32) {
-        let holds = |request: &Request| request.run.numbers().contains(&block);
-        if let Some(at) = self.ahead.iter().position(holds)
-            && let Some(request) = self.ahead.remove(at)
+        if let Some(at) = self.ahead.iter().position(|run| run.numbers().contains(&block))
+            && let Some(run) = self.ahead.remove(at)
         {
-            self.urgent.push_back(Request { frame: self.frame, ..request });
+            self.urgent.push_back(run);
         }
     }
 }
@@ -122,14 +124,14 @@ pub(crate) struct OnLine {
 }
 
 impl Reads for OnLine {
-    type Read = Request;
+    type Read = Reading;
 
-    fn start(&mut self) -> Option<(Request, u64)> {
-        let request = self.queue.next()?;
-        Some((request, request.run.place(&self.file).1))
+    fn start(&mut self) -> Option<(Reading, u64)> {
+        let reading = self.queue.next()?;
+        Some((reading, reading.run.place(&self.file).1))
     }
 
-    fn end(&mut self, Request { run, frame }: Request) {
+    fn end(&mut self, Reading { run, frame }: Reading) {
         self.queue.done.push(read_run(&self.file, run, frame, &mut self.buffer));
     }
 }
@@ -137,7 +139,7 @@ impl Reads for OnLine {
 /// What reads for a tree.
 pub(crate) enum Loader {
     Thread(Thread),
-    Line(Box<(Line<Request>, OnLine)>),
+    Line(Box<(Line<Reading>, OnLine)>),
 }
 
 impl Loader {
@@ -152,6 +154,15 @@ impl Loader {
         Self::Line(Box::new((Line::new(store), on_line)))
     }
 
+    /// Requests that wait for their turn: those that were missed, and those that are only foreseen.
+    pub fn waiting(&self) -> [usize; 2] {
+        let lengths = |queue: &Queue| [queue.urgent.len(), queue.ahead.len()];
+        match self {
+            Self::Thread(thread) => lengths(&thread.shared.queue.lock()),
+            Self::Line(line) => lengths(&line.1.queue),
+        }
+    }
+
     fn with_queue<R>(&mut self, f: impl FnOnce(&mut Queue) -> R) -> R {
         match self {
             Self::Thread(thread) => f(&mut thread.shared.queue.lock()),
@@ -162,11 +173,10 @@ impl Loader {
     /// Asks for a run.
     pub fn ask(&mut self, run: Run, is_urgent: bool) {
         self.with_queue(|queue| {
-            let request = Request { run, frame: queue.frame };
             if is_urgent {
-                queue.urgent.push_back(request);
+                queue.urgent.push_back(run);
             } else {
-                queue.ahead.push_back(request);
+                queue.ahead.push_back(run);
             }
         });
         if let Self::Thread(thread) = self {
@@ -181,7 +191,12 @@ impl Loader {
 
     /// Takes back what was asked for ahead of time, was not missed since and has not been started.
     pub fn withdraw(&mut self, runs: &mut Vec<Run>) {
-        self.with_queue(|queue| runs.extend(queue.ahead.drain(..).map(|request| request.run)));
+        self.with_queue(|queue| runs.extend(queue.ahead.drain(..)));
+    }
+
+    /// Takes back the request for a block that was missed, if `may` says so of its run and it has not been started.
+    pub fn take_back(&mut self, block: u32, may: impl FnOnce(Run) -> bool) -> Option<Run> {
+        self.with_queue(|queue| queue.take_back(block, may))
     }
 
     /// A frame begins: takes what has been read.
@@ -251,7 +266,7 @@ fn work(file: &XfmFile, shared: &Shared) {
     let mut buffer = Vec::new();
     let mut queue = shared.queue.lock();
     while !queue.is_closed {
-        let Some(Request { run, frame }) = queue.next() else {
+        let Some(Reading { run, frame }) = queue.next() else {
             shared.rest.notify_all();
             shared.work.wait(&mut queue);
             continue;

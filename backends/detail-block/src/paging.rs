@@ -22,7 +22,7 @@ use std::time::Duration;
 
 use rustc_hash::FxHashMap;
 use slab::Slab;
-use vertex_tree::{Bounds, NONE, NodeId, PageStats, TreeError};
+use vertex_tree::{Bounds, LookAhead, NONE, NodeId, PageStats, TreeError};
 
 use crate::block::{Block, Node, resident_bytes};
 use crate::error::XfmError;
@@ -32,6 +32,7 @@ use crate::loader::{Answer, Loader};
 use crate::requests::tree_error;
 use crate::returns::Returns;
 use crate::settings::Settings;
+use crate::waiting::Waiting;
 
 /// How many times in a row reading a block may fail before that is an error of the tree.
 pub const ATTEMPTS: u32 = 16;
@@ -83,6 +84,7 @@ pub(crate) struct Paging {
     pub candidates: [VecDeque<(u64, u32)>; 2],
     pub stubs: FxHashMap<u32, Stub>,
     pub pending: FxHashMap<u32, Pending>,
+    pub waiting: Waiting,
     pub failures: FxHashMap<u32, u32>,
     /// When blocks were removed lately, and had left play.
     pub removed_at: FxHashMap<u32, (u64, u64)>,
@@ -90,6 +92,8 @@ pub(crate) struct Paging {
     /// `None` where loading blocks.
     pub loader: Option<Loader>,
     pub foresight: Foresight,
+    /// What is known of the store.
+    pub store: LookAhead,
     pub returns: Returns,
     pub soft: u64,
     pub hard: u64,
@@ -113,11 +117,13 @@ impl Paging {
             candidates: Default::default(),
             stubs: FxHashMap::default(),
             pending: FxHashMap::default(),
+            waiting: Waiting::default(),
             failures: FxHashMap::default(),
             removed_at: FxHashMap::default(),
             removed: VecDeque::new(),
             loader,
             foresight: Foresight::default(),
+            store: LookAhead::default(),
             returns: Returns::default(),
             soft: settings.soft_quota,
             hard: settings.hard_quota,
@@ -226,10 +232,11 @@ impl Paging {
 
     pub fn begin_frame(&mut self, arrived: &mut Vec<NodeId>) -> Result<(), TreeError> {
         self.frame += 1;
-        self.foresight.begin_frame();
+        arrived.append(&mut self.waiting.again);
         if let Some(loader) = &mut self.loader {
             let mut answers = std::mem::take(&mut self.answers);
             loader.take(self.frame, &mut answers);
+            self.store.begin_frame(answers.len(), loader.waiting().iter().sum());
             for answer in answers.drain(..) {
                 self.integrate(answer, arrived);
             }

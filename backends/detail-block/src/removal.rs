@@ -49,6 +49,11 @@ impl Paging {
         parent != NONE && self.is_active(NodeId(parent))
     }
 
+    /// Whether no change has made use of a block since a frame, and none that waits has before.
+    fn is_unused(&self, number: u32, since: u64) -> bool {
+        self.block(number).is_some_and(|block| block.used < since) && !self.waiting.pins(number)
+    }
+
     /// Of the candidates that are out of play, or of those in play, the one that was used least recently, taken out of its
     /// queue, if nothing has used it since a frame or will as far as can be foreseen.
     fn next_candidate(&mut self, in_play: bool, unused_since: u64) -> Option<u32> {
@@ -63,8 +68,10 @@ impl Paging {
             if !is_current || !self.is_candidate(number) {
                 continue;
             }
-            let is_unused = self.block(number).is_some_and(|block| block.used < unused_since);
-            if is_unused && self.is_in_play(number) == in_play && !self.foresight.holds(number) {
+            if self.is_unused(number, unused_since)
+                && self.is_in_play(number) == in_play
+                && !self.foresight.holds(number)
+            {
                 return Some(number);
             }
             self.may_go(number);
@@ -87,8 +94,7 @@ impl Paging {
             return Some(number);
         }
         while let Some(number) = self.foresight.farthest(due) {
-            let is_unused = self.block(number).is_some_and(|block| block.used < unused_since);
-            if is_unused && self.is_candidate(number) {
+            if self.is_unused(number, unused_since) && self.is_candidate(number) {
                 return Some(number);
             }
         }
@@ -118,8 +124,8 @@ impl Paging {
 
     /// Makes room below the hard quota for so many bytes, which are needed in so many frames.
     ///
-    /// What a change has made use of in the last frame stays: a change that waits for more than one block asks for them in
-    /// every frame, so that what has come for it is still there when the rest does. With a camera at rest a block that
+    /// What a change has made use of in the last frame stays, and what one that waits is going to make use of, so that what
+    /// has come for it is still there when the rest does. With a camera at rest a block that
     /// has come for a change is thus not removed for another, and as every change that is made lets the front sink,
     /// loading comes to an end, whatever the quota.
     pub fn make_room(&mut self, bytes: u64, due: u32) -> bool {

@@ -16,14 +16,12 @@ impl Paging {
     /// once only where loading blocks.
     pub fn demand(&mut self, blocks: Range<u32>, node: NodeId) -> bool {
         let (mut missing, mut waits) = (Run { first: 0, count: 0 }, false);
-        for number in blocks {
+        for number in blocks.clone() {
             if self.block(number).is_some() {
                 self.use_block(number);
             } else if let Some(pending) = self.pending.get_mut(&number) {
                 waits = true;
-                if !pending.waiting.contains(&node) {
-                    pending.waiting.push(node);
-                }
+                pending.waiting.push(node);
                 if std::mem::take(&mut pending.is_ahead)
                     && let Some(loader) = &mut self.loader
                 {
@@ -36,15 +34,23 @@ impl Paging {
                 };
             }
         }
+        if waits {
+            self.wait(node, blocks.clone());
+        }
         if missing.count == 0 {
             return !waits;
         }
         if !self.make_room(self.bytes_of(missing), NOW) {
             self.counts.refused += 1;
             self.stats.no_room += 1;
+            self.waiting.again.push(node);
             return false;
         }
-        self.ask(missing, Some(node)) && !waits
+        let is_there = self.ask(missing, Some(node));
+        if !is_there && self.loader.is_some() {
+            self.wait(node, blocks);
+        }
+        is_there && !waits
     }
 
     /// Bytes of memory that blocks take.
@@ -69,8 +75,12 @@ impl Paging {
         let mut buffer = std::mem::take(&mut self.buffer);
         let answer = read_run(&self.file, run, self.frame, &mut buffer);
         self.buffer = buffer;
-        // Nobody waits: what asked goes on at once, or is refused and asks again.
-        self.integrate(answer, &mut Vec::new());
+        // What asked goes on at once, or is refused and asks again in the next frame.
+        let mut arrived = Vec::new();
+        self.integrate(answer, &mut arrived);
+        if run.numbers().any(|number| self.block(number).is_none()) {
+            self.waiting.again.append(&mut arrived);
+        }
         self.counts.blocked += start.elapsed();
         run.numbers().all(|number| self.block(number).is_some())
     }
@@ -79,10 +89,12 @@ impl Paging {
     pub fn integrate(&mut self, answer: Answer, arrived: &mut Vec<NodeId>) {
         let Answer { run, frame, bytes, blocks } = answer;
         self.reserved -= self.bytes_of(run);
-        self.foresight.observe(self.frame - frame);
+        self.store.arrived(self.frame - frame);
         let mut is_ahead = true;
-        for pending in run.numbers().filter_map(|number| self.pending.remove(&number)) {
+        for number in run.numbers() {
+            let Some(pending) = self.pending.remove(&number) else { continue };
             is_ahead &= pending.is_ahead;
+            pending.waiting.iter().for_each(|&node| self.stop_waiting(node));
             arrived.extend(pending.waiting);
         }
         let is_read = u64::from(blocks.is_ok());

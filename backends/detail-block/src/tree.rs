@@ -108,6 +108,7 @@ impl XfmTree {
             let number = levels.block(at);
             if !self.paging.demand(number..number + 1, node) {
                 self.paging.take_error()?;
+                self.paging.pin_for(node, Some(needed));
                 return Ok(false);
             }
             if self.paging.node(at).is_none() {
@@ -228,10 +229,12 @@ impl VertexTree for XfmTree {
     fn unfold<M: MeshSink>(&mut self, node: NodeId, mesh: &mut M) -> Result<Step, TreeError> {
         let levels = self.paging.file.levels();
         let number = levels.block(node);
+        self.paging.stop_waiting(node);
         let own_is_loaded = self.paging.demand(number..number + 1, node);
         let below = self.paging.child_blocks(node);
         if !own_is_loaded || !below.is_some_and(|below| self.paging.demand(below, node)) {
             self.paging.take_error()?;
+            self.paging.pin_for(node, None);
             return Ok(Step::NotResident);
         }
         let Some(stored) = self.paging.node(node).map(|node| node.stored) else {
@@ -306,7 +309,7 @@ impl VertexTree for XfmTree {
     }
 
     fn look_ahead(&self) -> u32 {
-        if self.foresees { self.paging.foresight.frames() } else { 0 }
+        if self.foresees { self.paging.look_ahead() } else { 0 }
     }
 
     fn will_need(&mut self, node: NodeId, frames: u32) {
@@ -326,6 +329,10 @@ impl VertexTree for XfmTree {
 
     fn begin_frame(&mut self, arrived: &mut Vec<NodeId>) -> Result<(), TreeError> {
         self.paging.begin_frame(arrived)
+    }
+
+    fn give_up(&mut self, node: NodeId) {
+        self.paging.give_up(node);
     }
 
     fn settle(&mut self) -> Result<(), TreeError> {

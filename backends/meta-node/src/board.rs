@@ -65,14 +65,24 @@ impl Board {
         self.lock().waiting.take_back(even_urgent)
     }
 
+    /// Navigation: takes back the command for a page, if it waits and is urgent.
+    pub fn take_back_urgent(&self, page: u32) -> Option<Command> {
+        self.lock().waiting.take_back_urgent(page)
+    }
+
     /// Navigation: takes back all commands that wait and are not urgent.
     pub fn take_back_ahead(&self, commands: &mut Vec<Command>) {
         self.lock().waiting.take_back_ahead(commands);
     }
 
-    /// Navigation: takes what has been done.
-    pub fn collect(&self, done: &mut Vec<Done>) {
-        self.lock().waiting.collect(done);
+    /// Navigation: takes what has been done, in a frame.
+    pub fn collect(&self, done: &mut Vec<Done>, frame: u64) {
+        self.lock().waiting.collect(done, frame);
+    }
+
+    /// Navigation: how many commands wait, urgent ones and others.
+    pub fn waiting(&self) -> [usize; 2] {
+        self.lock().waiting.lengths()
     }
 
     /// Navigation: waits until no command waits and none is being carried out.
@@ -133,7 +143,7 @@ mod tests {
     use shuttle::thread;
 
     fn command(page: u32, urgent: bool) -> Command {
-        Command { page, holder: page, words: vec![0; 1].into(), urgent, asked: 0 }
+        Command { page, holder: page, words: vec![0; 1].into(), urgent, started: 0 }
     }
 
     fn start(board: &Arc<Board>) -> thread::JoinHandle<()> {
@@ -152,18 +162,19 @@ mod tests {
         let (mut done, mut back) = (Vec::new(), Vec::new());
         board.post(&mut vec![command(0, false), command(1, false), command(2, false)], &mut Vec::new());
         board.post(&mut vec![command(3, true)], &mut vec![1]);
-        board.collect(&mut done);
+        board.collect(&mut done, 1);
         // All that waits and is not urgent, in another order.
         let mut again = Vec::new();
         board.take_back_ahead(&mut again);
         again.reverse();
         board.post(&mut again, &mut Vec::new());
+        back.extend(board.take_back_urgent(3));
         back.extend(board.take_back(false));
         back.extend(board.take_back(true));
         board.post(&mut vec![command(4, true)], &mut vec![2, 7]);
         board.settle();
         assert!(board.take_back(true).is_none(), "nothing waits after settling");
-        board.collect(&mut done);
+        board.collect(&mut done, 1);
         assert!(done.iter().all(|done| done.command.words[..] == [done.command.page]), "{done:?}");
         let mut pages: Vec<u32> =
             done.iter().map(|done| done.command.page).chain(back.iter().map(|c| c.page)).collect();
@@ -215,7 +226,7 @@ mod tests {
             let io = start(&board);
             board.post(&mut (0..4).map(|page| command(page, page % 2 == 0)).collect(), &mut vec![1]);
             let mut done = Vec::new();
-            board.collect(&mut done);
+            board.collect(&mut done, 1);
             board.stop();
             board.settle();
             io.join().unwrap();

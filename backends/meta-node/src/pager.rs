@@ -139,8 +139,9 @@ pub(crate) struct Pager {
     outbox: Vec<Command>,
     promoted: Vec<u32>,
     done: Vec<Done>,
-    /// Whether anything has arrived between two frames.
-    arrived_between: bool,
+    /// Pages whose requests have come to an end since the frame began, or between two: they have come, could not be read, or
+    /// have been taken back.
+    pub news: Vec<u32>,
     stats: PageStats,
     last_fault: Option<MetaNodeError>,
 }
@@ -172,7 +173,7 @@ impl Pager {
             outbox: Vec::new(),
             promoted: Vec::new(),
             done: Vec::new(),
-            arrived_between: false,
+            news: Vec::new(),
             stats: PageStats::default(),
             last_fault: None,
             file,
@@ -185,6 +186,12 @@ impl Pager {
     #[inline(always)]
     pub fn find(&self, page: u32) -> Option<u32> {
         Some(self.table[page as usize]).filter(|&holder| holder < PENDING)
+    }
+
+    /// Whether a page has been asked for and has not come yet.
+    pub fn is_under_way(&self, page: u32) -> bool {
+        let holder = self.table[page as usize];
+        holder != NONE && holder & PENDING != 0
     }
 
     #[inline(always)]

@@ -90,6 +90,13 @@ impl Store {
         }
     }
 
+    pub fn take_back_urgent(&mut self, page: u32) -> Option<Command> {
+        match self {
+            Self::Thread(board) => board.take_back_urgent(page),
+            Self::Simulated(store) => store.pages.waiting.take_back_urgent(page),
+        }
+    }
+
     pub fn take_back_ahead(&mut self, commands: &mut Vec<Command>) {
         match self {
             Self::Thread(board) => board.take_back_ahead(commands),
@@ -97,10 +104,18 @@ impl Store {
         }
     }
 
-    pub fn collect(&mut self, done: &mut Vec<Done>) {
+    pub fn collect(&mut self, done: &mut Vec<Done>, frame: u64) {
         match self {
-            Self::Thread(board) => board.collect(done),
-            Self::Simulated(store) => store.pages.waiting.collect(done),
+            Self::Thread(board) => board.collect(done, frame),
+            Self::Simulated(store) => store.pages.waiting.collect(done, frame),
+        }
+    }
+
+    /// How many commands wait, urgent ones and others.
+    pub fn waiting(&self) -> [usize; 2] {
+        match self {
+            Self::Thread(board) => board.waiting(),
+            Self::Simulated(store) => store.pages.waiting.lengths(),
         }
     }
 

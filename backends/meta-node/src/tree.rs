@@ -1,9 +1,10 @@
 //! The tree that the engine unfolds and folds.
 
+use std::collections::BTreeSet;
+use std::ops::Range;
 use std::sync::Arc;
 use std::time::Duration;
 
-use rustc_hash::FxHashSet;
 use vertex_tree::{Bounds, LeafTriangle, MeshSink, NodeId, PageStats, StarMesh, Step, TreeError, VertexTree};
 
 use crate::dependencies::{Half, Rules};
@@ -25,8 +26,11 @@ pub struct MetaNodeTree {
     mesh: Option<StarMesh>,
     rules: Option<Rules>,
     displayed: u64,
-    /// Nodes whose page was missing and has not come yet.
-    refused: FxHashSet<NodeId>,
+    /// Nodes that were refused and whose page is under way, those of one page together.
+    refused: BTreeSet<NodeId>,
+    /// Nodes that were refused and ask again in the next frame: no page is under way for them, or a rule of dependencies
+    /// holds others for as long as they are asked for.
+    again: Vec<NodeId>,
 }
 
 impl MetaNodeTree {
@@ -44,7 +48,8 @@ impl MetaNodeTree {
             mesh: None,
             rules: Rules::new(settings.dependencies, leaves),
             displayed: 0,
-            refused: FxHashSet::default(),
+            refused: BTreeSet::new(),
+            again: Vec::new(),
         };
         for root in 0..tree.roots.len() {
             tree.pager.count_usage(tree.roots[root].0 >> slot_bits, 1);
@@ -123,9 +128,18 @@ impl MetaNodeTree {
         let found = self.pager.find(page);
         if found.is_none() {
             self.pager.urge(page, switch);
-            self.refused.insert(node);
+            if self.rules.is_none() && self.pager.is_under_way(page) {
+                self.refused.insert(node);
+            } else {
+                self.again.push(node);
+            }
         }
         found
+    }
+
+    /// The numbers that nodes of a page have.
+    fn nodes_of(&self, page: u32) -> Range<NodeId> {
+        NodeId(page << self.slot_bits)..NodeId((page + 1) << self.slot_bits)
     }
 
     fn damaged(&self, page: u32) -> TreeError {
@@ -375,19 +389,26 @@ impl VertexTree for MetaNodeTree {
         if let Some(rules) = &mut self.rules {
             rules.begin_frame();
         }
-        if self.pager.begin_frame() && !self.refused.is_empty() {
-            let (pager, bits) = (&self.pager, self.slot_bits);
-            let before = arrived.len();
-            self.refused.retain(|&node| {
-                let is_here = pager.find(node.0 >> bits).is_some();
-                if is_here {
-                    arrived.push(node);
-                }
-                !is_here
-            });
-            arrived[before..].sort_unstable();
+        arrived.append(&mut self.again);
+        self.pager.begin_frame();
+        let mut news = std::mem::take(&mut self.pager.news);
+        for page in news.drain(..).filter(|&page| !self.pager.is_under_way(page)) {
+            let nodes = self.nodes_of(page);
+            while let Some(&node) = self.refused.range(nodes.clone()).next() {
+                self.refused.remove(&node);
+                arrived.push(node);
+            }
         }
+        self.pager.news = news;
         Ok(())
+    }
+
+    fn give_up(&mut self, node: NodeId) {
+        self.again.retain(|&other| other != node);
+        let (page, _) = self.place(node);
+        if self.refused.remove(&node) && self.refused.range(self.nodes_of(page)).next().is_none() {
+            self.pager.demote(page);
+        }
     }
 
     fn settle(&mut self) -> Result<(), TreeError> {

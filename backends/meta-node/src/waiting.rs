@@ -14,8 +14,8 @@ pub(crate) struct Command {
     pub words: Box<[u32]>,
     /// A change has been refused for want of the page.
     pub urgent: bool,
-    /// The frame in which it was asked for.
-    pub asked: u64,
+    /// The frame in which reading began.
+    pub started: u64,
 }
 
 /// A command that has been carried out.
@@ -31,6 +31,8 @@ pub(crate) struct Waiting {
     urgent: VecDeque<Command>,
     ahead: VecDeque<Command>,
     done: Vec<Done>,
+    /// The navigation's frame.
+    frame: u64,
 }
 
 impl Waiting {
@@ -56,6 +58,12 @@ impl Waiting {
         ahead.or_else(|| if even_urgent { self.urgent.pop_back() } else { None })
     }
 
+    /// Takes back the command for a page, if it is urgent.
+    pub fn take_back_urgent(&mut self, page: u32) -> Option<Command> {
+        let at = self.urgent.iter().position(|command| command.page == page)?;
+        self.urgent.remove(at)
+    }
+
     /// Takes back all commands that are not urgent.
     pub fn take_back_ahead(&mut self, commands: &mut Vec<Command>) {
         commands.extend(self.ahead.drain(..));
@@ -63,7 +71,14 @@ impl Waiting {
 
     /// The command to carry out next.
     pub fn next(&mut self) -> Option<Command> {
-        self.urgent.pop_front().or_else(|| self.ahead.pop_front())
+        let mut command = self.urgent.pop_front().or_else(|| self.ahead.pop_front())?;
+        command.started = self.frame;
+        Some(command)
+    }
+
+    /// How many commands wait, urgent ones and others.
+    pub fn lengths(&self) -> [usize; 2] {
+        [self.urgent.len(), self.ahead.len()]
     }
 
     /// A command has been carried out.
@@ -71,8 +86,9 @@ impl Waiting {
         self.done.push(done);
     }
 
-    /// Takes what has been done.
-    pub fn collect(&mut self, done: &mut Vec<Done>) {
+    /// Takes what has been done, in a frame.
+    pub fn collect(&mut self, done: &mut Vec<Done>, frame: u64) {
+        self.frame = frame;
         done.append(&mut self.done);
     }
 

@@ -90,8 +90,8 @@ fn what_is_named_in_time_is_there_in_time() {
         }
         assert_eq!(
             farthest,
-            if prefetch == Prefetch::Schedule { 6 } else { 0 },
-            "frames that a page takes, and one"
+            if prefetch == Prefetch::Schedule { 10 } else { 0 },
+            "twice the frames that a page takes"
         );
         (sum, refusals, late)
     };

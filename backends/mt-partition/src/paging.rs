@@ -61,8 +61,10 @@ struct Group {
 #[derive(Debug)]
 struct Read {
     ticket: Ticket,
-    /// The nodes whose groups wait for it; none if it is only foreseen.
+    /// The nodes whose groups wait for it; none if it is only foreseen, or if none is wanted any more.
     waiting: Vec<u32>,
+    /// Whether it was asked for ahead of time, and no group has waited for it since.
+    is_ahead: bool,
 }
 
 /// Frames in which the cache mode may wait for answers: what has arrived for a change that waits for more would be let go
@@ -281,17 +283,36 @@ impl Paging {
             if read.waiting.is_empty() {
                 self.line.rank(&mut read.ticket, urgency);
             }
+            read.is_ahead &= waiting.is_none();
             read.waiting.extend(waiting);
             return true;
         }
         match self.line.ask(self.nodes_of(unit), urgency) {
             Some(ticket) => {
-                self.reads.insert(unit, Read { ticket, waiting: waiting.into_iter().collect() });
+                let is_ahead = waiting.is_none();
+                self.reads.insert(unit, Read { ticket, waiting: waiting.into_iter().collect(), is_ahead });
                 true
             }
             None => {
                 self.is_lost = true;
                 false
+            }
+        }
+    }
+
+    /// A change that was refused is not wanted any more: what only it waits for is not either.
+    pub fn give_up(&mut self, node: u32) {
+        self.again.retain(|&other| other != node);
+        self.first = self.first.filter(|&(first, _)| first != node);
+        let Some(group) = self.groups.remove(&node) else { return };
+        for member in group.members {
+            self.residents.unpin(member, 0);
+            let unit = self.unit_of(member);
+            let Some(read) = self.reads.get_mut(&unit) else { continue };
+            let before = read.waiting.len();
+            read.waiting.retain(|&other| other != node);
+            if read.waiting.len() < before {
+                self.withdraw(unit);
             }
         }
     }
@@ -307,12 +328,15 @@ impl Paging {
         self.frame += 1;
         self.line.set_frame(self.frame);
         arrived.extend(self.again.drain(..).map(NodeId));
-        for answer in std::mem::take(&mut self.answers) {
+        let mut answers = std::mem::take(&mut self.answers);
+        answers.extend(std::iter::from_fn(|| self.line.take()));
+        if let Some(foresight) = &mut self.foresight {
+            foresight.store.begin_frame(answers.len(), self.line.waiting().iter().sum());
+        }
+        for answer in answers.drain(..) {
             self.arrive(answer, arrived);
         }
-        while let Some(answer) = self.line.take() {
-            self.arrive(answer, arrived);
-        }
+        self.answers = answers;
     }
 
     /// Waits for all that has been asked for.
@@ -352,7 +376,9 @@ impl Paging {
         self.foresee();
         // What found no room may have anything that is not needed at this moment.
         self.wanted = 0;
-        self.first = self.first.and_then(|(first, is_asked_for)| is_asked_for.then_some((first, false)));
+        // It does not ask while what it needs is on its way.
+        let goes_on = |&(first, is_asked_for): &(u32, bool)| is_asked_for || self.groups.contains_key(&first);
+        self.first = self.first.filter(goes_on).map(|(first, _)| (first, false));
         let mut deferred = std::mem::take(&mut self.deferred);
         let is_first = |node: u32| self.first.is_some_and(|(first, _)| first == node);
         deferred.sort_by_key(|&(node, _)| !is_first(node));

@@ -250,6 +250,17 @@ impl Line {
         is_withdrawn
     }
 
+    /// How many of this tree's requests wait for their turn: those of refused changes, and those that are foreseen.
+    pub fn waiting(&self) -> [usize; 2] {
+        let mut counts = [0; 2];
+        for (ticket, request) in &self.shared().queue().requests {
+            if Arc::ptr_eq(&request.tree, &self.tree) {
+                counts[usize::from(ticket.urgency != NOW)] += 1;
+            }
+        }
+        counts
+    }
+
     /// An answer that has come.
     pub fn take(&mut self) -> Option<Answer> {
         let answer = self.answers.try_recv().ok()?;

@@ -278,6 +278,10 @@ impl VertexTree for MtTree {
         self.check_reader()
     }
 
+    fn give_up(&mut self, node: NodeId) {
+        self.paging.give_up(node.0);
+    }
+
     fn settle(&mut self) -> Result<(), TreeError> {
         self.paging.settle();
         self.check_reader()

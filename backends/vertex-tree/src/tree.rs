@@ -32,8 +32,10 @@ pub enum Step {
     Blocked,
     /// Folding: something unfolded depends on this node. It folds when nothing does any more.
     StillNeeded,
-    /// The page that holds the node, or its children, is not in memory. It has been asked for, and the node will
-    /// be among the arrivals of a later [`VertexTree::begin_frame`].
+    /// A page that the change needs is not in memory. The node will be among the arrivals of a later
+    /// [`VertexTree::begin_frame`], when it is worth asking again: as a page has come, or as the request could not be made
+    /// or has failed. Until then the engine does not ask. If the change is not wanted any more, it says so
+    /// ([`VertexTree::give_up`]).
     NotResident,
 }
 
@@ -196,8 +198,9 @@ pub trait VertexTree {
         let _ = (node, step);
     }
     /// For how many frames ahead the engine shall foresee what changes, and say so through
-    /// [`will_need`](Self::will_need): as many as it takes to fetch a page, and one more; 0 for not at all. Asked in
-    /// every frame, as a store may be slow for a while.
+    /// [`will_need`](Self::will_need): at least as many as it takes to fetch a page; 0 for not at all, or while what
+    /// refused changes wait for takes longer than anybody looks ahead (see [`LookAhead`](crate::LookAhead)). Asked in every frame, as a store may be
+    /// slow for a while.
     fn look_ahead(&self) -> u32 {
         0
     }
@@ -223,11 +226,16 @@ pub trait VertexTree {
         let _ = time;
         Ok(())
     }
-    /// Starts a frame. Appends to `arrived` the nodes for which a [`Step::NotResident`] was answered and that can
-    /// be asked again.
+    /// Starts a frame. Appends to `arrived` the nodes for which a [`Step::NotResident`] was answered and that are to be asked
+    /// again. One that is missing here waits for as long as it is wanted, so a backend in doubt names it.
     fn begin_frame(&mut self, arrived: &mut Vec<NodeId>) -> Result<(), TreeError> {
         let _ = arrived;
         Ok(())
+    }
+    /// Says that nobody waits any more for the page of a node for which a [`Step::NotResident`] was answered: its change is
+    /// not wanted any more. It may be wanted again later, and is asked for anew then.
+    fn give_up(&mut self, node: NodeId) {
+        let _ = node;
     }
     /// Waits until every page that has been asked for has arrived or failed: for replays whose cuts shall be comparable,
     /// and for a first frame. Nothing else here may wait.

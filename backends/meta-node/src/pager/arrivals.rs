@@ -8,21 +8,19 @@ use crate::page::Layout;
 use crate::waiting::{Command, Done};
 
 impl Pager {
-    /// Starts a frame: takes what has arrived. Says whether anything has since the frame before.
-    pub fn begin_frame(&mut self) -> bool {
+    /// Starts a frame: takes what has arrived.
+    pub fn begin_frame(&mut self) {
         self.frame += 1;
-        self.foresight.next_frame();
-        let since = std::mem::take(&mut self.arrived_between);
-        let now = self.take_arrivals();
+        let came = self.take_arrivals();
+        self.foresight.next_frame(came, self.store.waiting().iter().sum());
         self.shrink();
-        since || now
     }
 
-    /// Takes what has arrived, and says whether anything has.
-    pub(super) fn take_arrivals(&mut self) -> bool {
+    /// Takes what has arrived, and says how much that is.
+    pub(super) fn take_arrivals(&mut self) -> usize {
         let mut done = std::mem::take(&mut self.done);
-        self.store.collect(&mut done);
-        let any = !done.is_empty();
+        self.store.collect(&mut done, self.frame);
+        let count = done.len();
         for Done { command, result } in done.drain(..) {
             match result {
                 Ok(layout) => self.arrive(command, layout),
@@ -30,13 +28,14 @@ impl Pager {
             }
         }
         self.done = done;
-        any
+        count
     }
 
     fn arrive(&mut self, command: Command, layout: Layout) {
-        let Command { page, holder, words, urgent, asked } = command;
+        let Command { page, holder, words, urgent, started } = command;
         self.failures.remove(&page);
-        self.foresight.arrived(self.frame - asked);
+        self.news.push(page);
+        self.foresight.arrived(self.frame - started);
         // One that a change has asked for while it was being read is not marked as urgent itself.
         let demanded = urgent || self.holders[holder as usize].demanded;
         self.stats.reads += 1;

@@ -10,22 +10,17 @@
 //! the future is known). So of two pages that compete for a place the nearer one always wins, and there is no loading in
 //! turns.
 
-use vertex_tree::NONE;
+use vertex_tree::{LookAhead, NONE};
 
 use super::Pager;
 use crate::lists::Class;
 use crate::waiting::Command;
 
-/// Look this far ahead at least, and at most.
+/// Look this far ahead at least.
 const LEAST_AHEAD: u32 = 2;
 /// At least where memory is full. What is let go of has to come again, and where a car turns in a large city, more pages are
 /// needed in a frame than a store can read in one: they are fetched in the time before.
 const LEAST_AHEAD_FULL: u32 = 4;
-const MOST_AHEAD: u32 = 60;
-
-/// What is left of the longest time of a fetch after another: half after 69. Where nothing is fetched, nothing is
-/// forgotten.
-const MEMORY: f32 = 0.99;
 
 /// What is known of a page that some change is expected on.
 #[derive(Clone, Copy, Debug, Default)]
@@ -46,12 +41,11 @@ pub(super) struct Foresight {
     before: Vec<u32>,
     /// What was said at the end of this frame or later holds.
     since: u32,
-    /// The number of frames that a fetch has lately taken at most.
-    taken: f32,
+    /// What is known of the store.
+    store: LookAhead,
     /// Pages that are needed and not there, with when; and commands that have been taken back, by page.
     missing: Vec<(u32, u32)>,
     taken_back: Vec<Command>,
-    asked: Vec<(u32, u64)>,
     /// Place holders whose pages are foreseen, the farthest last; whether that is so in this frame.
     farthest: Vec<(u32, u32)>,
     is_sorted: bool,
@@ -64,33 +58,28 @@ impl Foresight {
             named: Vec::new(),
             before: Vec::new(),
             since: 1,
-            taken: 0.0,
+            store: LookAhead::default(),
             missing: Vec::new(),
             taken_back: Vec::new(),
-            asked: Vec::new(),
             farthest: Vec::new(),
             is_sorted: false,
         }
     }
 
-    pub fn next_frame(&mut self) {
+    /// A frame begins in which so many pages have come, and so many commands still wait.
+    pub fn next_frame(&mut self, came: usize, waiting: usize) {
         self.is_sorted = false;
+        self.store.begin_frame(came, waiting);
     }
 
-    /// A page has come so many frames after it was asked for.
+    /// A page has come so many frames after reading it began.
     pub fn arrived(&mut self, frames: u64) {
-        self.taken = (self.taken * MEMORY).max(frames.min(u64::from(MOST_AHEAD)) as f32);
+        self.store.arrived(frames);
     }
 
     #[inline]
     pub fn is_foreseen(&self, page: u32) -> bool {
         self.due.get(page as usize).is_some_and(|due| due.said >= self.since)
-    }
-
-    /// When a page was asked for, if that request has just been taken back.
-    pub fn asked_before(&self, page: u32) -> Option<u64> {
-        let at = self.asked.binary_search_by_key(&page, |&(page, _)| page).ok()?;
-        Some(self.asked[at].1)
     }
 }
 
@@ -101,7 +90,9 @@ impl Pager {
             return 0;
         }
         let least = if self.room_for_largest() == 0 { LEAST_AHEAD_FULL } else { LEAST_AHEAD };
-        (self.foresight.taken.ceil() as u32 + 1).clamp(least, MOST_AHEAD)
+        let [missed, _] = self.store.waiting();
+        let missed = missed + self.outbox.iter().filter(|command| command.urgent).count();
+        self.foresight.store.frames(missed, least)
     }
 
     /// A change on a page is expected in so many frames.
@@ -157,7 +148,6 @@ impl Pager {
             self.ask(page, false);
         }
         self.foresight.missing = missing;
-        self.foresight.asked.clear();
     }
 
     /// Takes back the requests that wait and that no change has asked for.
@@ -167,10 +157,8 @@ impl Pager {
         self.post();
         self.store.take_back_ahead(&mut commands);
         for command in commands.drain(..) {
-            self.foresight.asked.push((command.page, command.asked));
             self.release(&command);
         }
-        self.foresight.asked.sort_unstable();
         self.foresight.taken_back = commands;
     }
 

@@ -38,10 +38,9 @@ impl Pager {
             if let Some(victim) = Class::ALL.into_iter().find_map(|class| lists.front(class)) {
                 self.evict(victim);
             } else if self.withdraw(true) {
-            } else if self.take_arrivals() {
+            } else if self.take_arrivals() > 0 {
                 // What has come meanwhile can go too. Then one at most is being read, and with the roots that are kept
                 // that is no more than is allowed. On virtual time it may be more: those end first.
-                self.arrived_between = true;
             } else {
                 return;
             }

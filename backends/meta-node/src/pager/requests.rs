@@ -34,6 +34,7 @@ impl Pager {
     pub(super) fn release(&mut self, command: &Command) {
         let words = command.words.len() as u64;
         self.table[command.page as usize] = NONE;
+        self.news.push(command.page);
         self.taken -= words;
         self.under_way -= words;
         self.holders[command.holder as usize].page = NONE;
@@ -171,6 +172,22 @@ impl Pager {
         }
     }
 
+    /// No change waits any more for a page that is under way. If it has not been started, it is not urgent any more, and
+    /// without anything that fetches pages ahead it is not read.
+    pub fn demote(&mut self, page: u32) {
+        let holder = self.table[page as usize];
+        if holder == NONE || holder & PENDING == 0 {
+            return;
+        }
+        let Some(mut command) = self.store.take_back_urgent(page) else { return };
+        if self.how == Prefetch::None {
+            return self.release(&command);
+        }
+        self.holders[(holder & !PENDING) as usize].demanded = false;
+        command.urgent = false;
+        self.outbox.push(command);
+    }
+
     /// For how many of the largest pages there is room without dropping any.
     pub(super) fn room_for_largest(&self) -> u64 {
         self.allowed.saturating_sub(self.taken) / u64::from(self.file.header.largest_words).max(1)
@@ -226,7 +243,6 @@ impl Pager {
             }
         };
         self.table[page as usize] = PENDING | holder;
-        let asked = self.foresight.asked_before(page).unwrap_or(self.frame);
-        self.outbox.push(Command { page, holder, words, urgent, asked });
+        self.outbox.push(Command { page, holder, words, urgent, started: 0 });
     }
 }

@@ -11,8 +11,8 @@ const LONGEST_PAUSE: u64 = 64;
 impl Paging {
     pub(super) fn arrive(&mut self, answer: Answer, arrived: &mut Vec<NodeId>) {
         let unit = self.unit_of(answer.nodes.start);
-        let waiting = self.reads.remove(&unit).map(|read| read.waiting).unwrap_or_default();
-        let is_ahead = waiting.is_empty();
+        let read = self.reads.remove(&unit);
+        let (waiting, is_ahead) = read.map_or((Vec::new(), true), |read| (read.waiting, read.is_ahead));
         let mut faults = 0;
         match answer.records {
             Err(_) => faults = 1,
@@ -21,7 +21,7 @@ impl Paging {
                 self.stats.read_bytes += self.file.bytes(answer.nodes.clone());
                 self.stats.ahead += u64::from(is_ahead);
                 if let Some(foresight) = &mut self.foresight {
-                    foresight.measure(self.frame.saturating_sub(answer.started));
+                    foresight.store.arrived(self.frame.saturating_sub(answer.started));
                 }
                 for (node, record) in answer.nodes.clone().zip(records) {
                     let Ok(record) = record else {

@@ -8,14 +8,15 @@
 use std::collections::VecDeque;
 
 use rustc_hash::{FxHashMap, FxHashSet};
+use vertex_tree::LookAhead;
 
 use super::room::Need;
 use super::{Change, Paging};
 
-/// The most frames that the engine is asked to look ahead, and for how long something that was named is kept.
-const MOST: u32 = 60;
-/// What is left of the longest time of a fetch from frame to frame: a half after three seconds.
-const DECAY: f64 = 0.996;
+/// Frames of foresight, at least.
+const LEAST: u32 = 2;
+/// For how many frames something that was named is kept.
+const KEPT: u64 = 60;
 
 #[derive(Clone, Copy, Debug)]
 struct Expected {
@@ -39,8 +40,8 @@ pub(super) struct Foresight {
     expiring: VecDeque<(u64, u32)>,
     /// What was fetched ahead and no change has used yet.
     pub unused: FxHashSet<u32>,
-    /// Frames that a fetch has lately taken.
-    slowest: f64,
+    /// What is known of the store.
+    pub store: LookAhead,
 }
 
 impl Foresight {
@@ -52,11 +53,6 @@ impl Foresight {
     /// Whether the node is kept.
     pub fn keeps(&self, node: u32) -> bool {
         self.expected.contains_key(&node)
-    }
-
-    /// A fetch has taken so many frames.
-    pub fn measure(&mut self, frames: u64) {
-        self.slowest = self.slowest.max(frames as f64);
     }
 
     /// The farthest of what is expected, in `earliest` or later; each once in a frame.
@@ -84,7 +80,9 @@ impl Foresight {
 impl Paging {
     /// For how many frames ahead it is worth knowing what will be needed.
     pub fn look_ahead(&self) -> u32 {
-        self.foresight.as_ref().map_or(0, |f| (f.slowest.ceil() as u32 + 1).clamp(2, MOST))
+        let Some(foresight) = &self.foresight else { return 0 };
+        let [missed, _] = self.line.waiting();
+        foresight.store.frames(missed, LEAST)
     }
 
     pub fn will_need(&mut self, node: u32, frames: u32) {
@@ -98,7 +96,6 @@ impl Paging {
         let Some(foresight) = &mut self.foresight else { return };
         let before = std::mem::take(&mut foresight.named);
         foresight.frame = self.frame;
-        foresight.slowest *= DECAY;
         let mut naming = std::mem::take(&mut foresight.naming);
         for (node, frames) in naming.drain(..) {
             let due = self.frame + u64::from(frames);
@@ -113,7 +110,7 @@ impl Paging {
             if !foresight.is_named(node) {
                 // From now on it goes when its turn comes.
                 self.residents.touch(node);
-                foresight.expiring.push_back((self.frame + u64::from(MOST), node));
+                foresight.expiring.push_back((self.frame + KEPT, node));
             }
         }
         let Foresight { named, expected, .. } = foresight;
@@ -122,7 +119,7 @@ impl Paging {
         let mut gone = Vec::new();
         while foresight.expiring.front().is_some_and(|&(frame, _)| frame <= self.frame) {
             let Some((_, node)) = foresight.expiring.pop_front() else { break };
-            let is_over = |e: &Expected| e.named + u64::from(MOST) <= self.frame;
+            let is_over = |e: &Expected| e.named + KEPT <= self.frame;
             if foresight.expected.get(&node).is_some_and(is_over) {
                 foresight.expected.remove(&node);
                 gone.push(node);

@@ -1,13 +1,14 @@
 //! What fetching ahead is worth: misses, bytes, precision and recall of each paper's own scheme and of the engine's
 //! foresight, along real trajectories over real meshes, on virtual time; then what a slow store does to the time of
-//! selection, by the wall clock.
+//! selection.
 //!
-//! `cargo bench --bench prefetch [-- MESH...]` prints tables. The meshes are dragon, happy and sierra (four tiles) of the
-//! shared data, or what is found under these names, as collapse logs, in the folder that `FOLDFRONT_LOGS` names.
+//! `cargo bench --bench prefetch [-- PART... MESH...]` prints tables. The parts are `--misses`, `--slow` and `--wall-clock`
+//! (see `slow_store`), all of them unless some are named. The meshes are dragon, happy and sierra (four tiles) of the shared
+//! data, or what is found under these names, as collapse logs, in the folder that `FOLDFRONT_LOGS` names.
+
+mod slow_store;
 
 use std::path::{Path as FilePath, PathBuf};
-use std::sync::Arc;
-use std::sync::atomic::{AtomicU64, Ordering};
 use std::time::Duration;
 
 use foldfront::compare::csv::Summary;
@@ -19,7 +20,6 @@ use foldfront::refine::Strategy;
 use foldfront::simplify;
 use foldfront::store::{self, Backend, BuildOptions, Store};
 use foldfront::vertex_tree::simulated::Simulated;
-use foldfront::vertex_tree::source::{FileSource, PageSource};
 use foldfront::vertex_tree::{Prefetch, read_log};
 
 const DATA: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/../shared/data");
@@ -46,15 +46,29 @@ const REST: usize = 240;
 const FRAME: Duration = Duration::from_nanos(16_666_667);
 const LATENCY: Duration = Duration::from_millis(5);
 
-/// Frames of each path that are replayed by the wall clock.
-const WALL_FRAMES: usize = 600;
+/// What is measured.
+#[derive(Clone, Copy)]
+struct Parts {
+    misses: bool,
+    slow: bool,
+    wall_clock: bool,
+}
 
 fn main() {
+    let is_named = |part: &str| std::env::args().any(|argument| argument == part);
+    let mut parts = Parts {
+        misses: is_named("--misses"),
+        slow: is_named("--slow"),
+        wall_clock: is_named("--wall-clock"),
+    };
+    if !(parts.misses || parts.slow || parts.wall_clock) {
+        parts = Parts { misses: true, slow: true, wall_clock: true };
+    }
     let wanted: Vec<String> = std::env::args().skip(1).filter(|a| !a.starts_with('-')).collect();
     for (mesh, files) in MESHES {
         if wanted.is_empty() || wanted.iter().any(|name| name == mesh) {
             match hierarchy(mesh, files) {
-                Some(log) => compare(mesh, &log),
+                Some(log) => compare(mesh, &log, parts),
                 None => println!("{mesh}: not there"),
             }
         }
@@ -71,7 +85,7 @@ fn hierarchy(mesh: &str, files: &[&str]) -> Option<foldfront::CollapseLog> {
     Some(built.expect("a mesh").0)
 }
 
-fn compare(mesh: &str, log: &foldfront::CollapseLog) {
+fn compare(mesh: &str, log: &foldfront::CollapseLog, parts: Parts) {
     let folder = tempfile::tempdir().expect("room for files");
     let walks: Vec<Path> = PATHS
         .iter()
@@ -95,24 +109,20 @@ fn compare(mesh: &str, log: &foldfront::CollapseLog) {
             backend.name(),
             std::fs::metadata(&file).map_or(0.0, |m| m.len() as f64) / f64::from(1 << 20)
         );
-        println!(
-            "{:8} {:9} {:>7} {:>7} {:>8} {:>8} {:>7} {:>8} {:>6} {:>6} {:>6} {:>5}",
-            "path",
-            "prefetch",
-            "MiB",
-            "misses",
-            "flips",
-            "miss %",
-            "reads",
-            "KiB",
-            "prec",
-            "rec",
-            "memory",
-            "stop"
-        );
-        let memory: Vec<u64> = walks.iter().map(|walk| virtual_time(&file, mesh, walk)).collect();
-        for (walk, page_memory) in walks.iter().zip(memory) {
-            wall_clock(&file, mesh, walk, page_memory);
+        let memory: Vec<u64> =
+            walks.iter().map(|walk| memory(&Subject::of_store(mesh, open(&file)), walk)).collect();
+        let walks = || walks.iter().zip(memory.iter().copied());
+        if parts.misses {
+            heading();
+            walks().for_each(|(walk, page_memory)| virtual_time(&file, mesh, walk, page_memory));
+        }
+        if parts.slow {
+            slow_store::heading();
+            walks().for_each(|(walk, page_memory)| slow_store::virtual_time(&file, mesh, walk, page_memory));
+        }
+        if parts.wall_clock {
+            slow_store::heading();
+            walks().for_each(|(walk, page_memory)| slow_store::wall_clock(&file, mesh, walk, page_memory));
         }
     }
 }
@@ -145,21 +155,37 @@ fn with_rest(walk: &Path) -> Path {
     path
 }
 
-/// Returns the page memory.
-fn virtual_time(file: &FilePath, mesh: &str, walk: &Path) -> u64 {
-    let mut subject = Subject::of_store(mesh, Store::open(file).expect("a valid file"));
-    let page_memory = memory(&subject, walk);
-    let walk = with_rest(walk);
-    let options = options(
-        Pace::Simulated(FRAME, Simulated::with_latency(LATENCY)),
-        page_memory,
-        Prefetch::ALL.to_vec(),
+fn open(file: &FilePath) -> Store {
+    Store::open(file).expect("a valid file")
+}
+
+fn heading() {
+    println!(
+        "{:8} {:9} {:>7} {:>7} {:>8} {:>8} {:>7} {:>8} {:>6} {:>6} {:>6} {:>5}",
+        "path",
+        "prefetch",
+        "MiB",
+        "misses",
+        "flips",
+        "miss %",
+        "reads",
+        "KiB",
+        "prec",
+        "rec",
+        "memory",
+        "stop"
     );
+}
+
+fn virtual_time(file: &FilePath, mesh: &str, walk: &Path, page_memory: u64) {
+    let mut subject = Subject::of_store(mesh, open(file));
+    let walk = with_rest(walk);
+    let pace = Pace::Simulated(FRAME, Simulated::with_latency(LATENCY));
+    let options = options(pace, page_memory, Prefetch::ALL.to_vec());
     let runs = subject.replay(&walk, 0..walk.frames.len(), &options, &mut |_, _| ()).expect("a valid file");
     for run in &runs {
         row(run, page_memory);
     }
-    page_memory
 }
 
 fn row(run: &Run, page_memory: u64) {
@@ -186,56 +212,4 @@ fn row(run: &Run, page_memory: u64) {
         percent(s.recall),
         s.memory_limited,
     );
-}
-
-/// A store that is slow once it is told to: a first frame is waited for, and shall not take minutes.
-#[derive(Debug)]
-struct SlowLater {
-    source: FileSource,
-    latency_ms: AtomicU64,
-}
-
-impl PageSource for SlowLater {
-    fn name(&self) -> &str {
-        self.source.name()
-    }
-    fn len(&self) -> u64 {
-        self.source.len()
-    }
-    fn read_at(&self, offset: u64, buffer: &mut [u8]) -> std::io::Result<()> {
-        std::thread::sleep(Duration::from_millis(self.latency_ms.load(Ordering::Relaxed)));
-        self.source.read_at(offset, buffer)
-    }
-}
-
-/// Percentiles of the selection time with an instant store and one of 50 ms, real threads.
-fn wall_clock(file: &FilePath, mesh: &str, walk: &Path, page_memory: u64) {
-    for (prefetch, latency) in
-        [(Prefetch::Paper, 0), (Prefetch::Paper, 50), (Prefetch::Schedule, 0), (Prefetch::Schedule, 50)]
-    {
-        let source = FileSource::open(file).expect("a valid file");
-        let source = Arc::new(SlowLater { source, latency_ms: AtomicU64::new(0) });
-        let store = Store::from_source(source.clone()).expect("a valid file");
-        let mut subject = Subject::of_store(mesh, store);
-        let options = options(Pace::WallClock(FRAME), page_memory, vec![prefetch]);
-        let runs = subject
-            .replay(walk, 0..walk.frames.len().min(WALL_FRAMES), &options, &mut |_, _| {
-                source.latency_ms.store(latency, Ordering::Relaxed);
-            })
-            .expect("a valid file");
-        let rows = &runs[0].rows[1..];
-        let mut times: Vec<Duration> = rows.iter().map(|row| row.report.select).collect();
-        times.sort_unstable();
-        let at =
-            |share: f64| times[((share * times.len() as f64).ceil() as usize).max(1) - 1].as_secs_f64() * 1e6;
-        println!(
-            "{:8} {:9} store of {latency:2} ms: selection {:6.0} us median, {:6.0} us 99 %, {:6.0} us 99.9 %; {} misses",
-            walk.name,
-            prefetch.name(),
-            at(0.5),
-            at(0.99),
-            at(0.999),
-            rows.iter().map(|row| row.report.misses).sum::<u64>(),
-        );
-    }
 }
