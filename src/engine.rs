@@ -7,7 +7,9 @@
 //!
 //! Everything here runs on the caller's thread. A backend may have threads of its own; no call waits for them.
 
+mod capped;
 mod changes;
+mod needs;
 mod waiting;
 
 use std::collections::BinaryHeap;
@@ -15,7 +17,9 @@ use std::time::{Duration, Instant};
 
 use vertex_tree::{MeshSink, NodeId, PageStats, TreeError, VertexTree};
 
-use self::changes::{Counts, Noted, Pending, Steps, Urgent};
+use self::capped::Urgent;
+use self::changes::{Counts, Noted, Steps};
+use self::needs::Pending;
 pub(crate) use self::waiting::Waiting;
 use crate::budget::{Budget, Steering, WorkCap};
 use crate::criterion::Criterion;

@@ -1,15 +1,17 @@
 //! Carrying out status changes, and what follows from them.
 //!
 //! Folds come first, then unfolds, each to a fixpoint: a node that comes into play in the course of this is tested at once
-//! and takes its turn at the end of its list. What a node needs beyond its parents goes on a stack on top of it.
+//! and takes its turn at the end of its list.
 
 use std::collections::BinaryHeap;
 use std::time::Instant;
 
 use vertex_tree::{MeshSink, NodeId, Step, TreeError, VertexTree};
 
+use super::capped::Urgent;
+use super::needs::Pending;
 use super::waiting::Waiting;
-use crate::budget::{FOLDING_SHARE, WorkCap};
+use crate::budget::WorkCap;
 use crate::front::{Front, Record, Slot};
 use crate::queue::Kind;
 use crate::refine::{Flips, Frame, Watch};
@@ -18,27 +20,6 @@ use crate::refine::{Flips, Frame, Watch};
 /// play and another node may have come to the slot.
 pub(super) type Noted = (Slot, NodeId);
 
-/// A node waiting on the stack for its turn.
-#[derive(Clone, Copy, PartialEq)]
-pub(super) struct Pending {
-    /// Where the node is, if it is known to be in play.
-    slot: Slot,
-    node: NodeId,
-    /// Whether an entry below waits for this one: a dependency, not something that a view wants.
-    needed: bool,
-    /// Whether this entry waits for those above.
-    waits: bool,
-}
-
-impl Pending {
-    fn wanted((slot, node): Noted) -> Self {
-        Self { slot, node, needed: false, waits: false }
-    }
-    fn needed(node: NodeId) -> Self {
-        Self { slot: Slot::NONE, node, needed: true, waits: false }
-    }
-}
-
 /// Counts of the frame under way.
 #[derive(Default)]
 pub(super) struct Counts {
@@ -46,15 +27,6 @@ pub(super) struct Counts {
     pub folds: u64,
     pub forced: u64,
     pub carried: u64,
-}
-
-/// A change that waits for its turn where work is capped. The most urgent one is the greatest.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
-pub(super) struct Urgent {
-    /// Bits of a number that is not negative, which are in the same order.
-    urgency: u64,
-    slot: Slot,
-    node: NodeId,
 }
 
 /// Changes that are made before the next ones are prepared.
@@ -155,7 +127,7 @@ impl<T: VertexTree, M: MeshSink, F: Watch> Steps<'_, T, M, F> {
     }
 
     /// What was needed when its turn came may have been let go since.
-    fn let_go(&mut self) -> Result<(), TreeError> {
+    pub(super) fn let_go(&mut self) -> Result<(), TreeError> {
         self.forbid();
         let mut before = None;
         while !self.still_needed.is_empty() && before != Some(self.counts.folds) {
@@ -172,58 +144,6 @@ impl<T: VertexTree, M: MeshSink, F: Watch> Steps<'_, T, M, F> {
             self.refused(slot, Kind::Fold);
         }
         Ok(())
-    }
-
-    /// The same within a cap, most urgent first. `start` is when the work began.
-    fn apply_within(
-        &mut self,
-        cap: WorkCap,
-        start: Instant,
-        [folds, unfolds]: &mut [BinaryHeap<Urgent>; 2],
-    ) -> Result<(), TreeError> {
-        let is_spent = |counts: &Counts, share: f64| match cap {
-            WorkCap::None => false,
-            WorkCap::Changes(most) => (counts.folds + counts.unfolds) as f64 >= most as f64 * share,
-            WorkCap::Time(most) => start.elapsed() >= most.mul_f64(share),
-        };
-        let mut result = Ok(());
-        // Folds that must not wait, unfolds, and folds again with what is left.
-        for (kind, share) in [(Kind::Fold, FOLDING_SHARE), (Kind::Unfold, 1.0), (Kind::Fold, 1.0)] {
-            let heap = if kind == Kind::Fold { &mut *folds } else { &mut *unfolds };
-            loop {
-                // At first all that was found, later what follows from a change.
-                self.await_turn(kind, heap);
-                if result.is_err() || is_spent(&self.counts, share) {
-                    break;
-                }
-                let Some(Urgent { slot, node, .. }) = heap.pop() else { break };
-                result = match kind {
-                    Kind::Fold => self.fold((slot, node)),
-                    Kind::Unfold => self.unfold((slot, node)),
-                };
-            }
-        }
-        for (kind, heap) in [(Kind::Fold, folds), (Kind::Unfold, unfolds)] {
-            for Urgent { slot, node, .. } in heap.drain() {
-                let is_still = if kind == Kind::Fold { is_collapsible } else { is_boundary };
-                if is_still(self.front, (slot, node)) {
-                    self.counts.carried += 1;
-                    self.refused(slot, kind);
-                }
-            }
-        }
-        result.and_then(|()| self.let_go())
-    }
-
-    /// Moves the changes found so far to a heap.
-    fn await_turn(&mut self, kind: Kind, heap: &mut BinaryHeap<Urgent>) {
-        let list = if kind == Kind::Fold { &mut *self.folding } else { &mut *self.unfolding };
-        heap.extend(list.drain(..).map(|(slot, node)| {
-            let urgency = self.frame.criterion.urgency(self.frame.views, &self.front.record(slot).bounds);
-            // Of what is to be folded, the least wanted first.
-            let urgency = if kind == Kind::Fold { 1.0 - urgency.min(1.0) } else { urgency };
-            Urgent { urgency: urgency.max(0.0).to_bits(), slot, node }
-        }));
     }
 
     /// The backend can not go on: whatever was to change is to be looked at again when it can.
@@ -280,7 +200,7 @@ impl<T: VertexTree, M: MeshSink, F: Watch> Steps<'_, T, M, F> {
         }
     }
 
-    fn wanted(&mut self, slot: Slot) -> bool {
+    pub(super) fn wanted(&mut self, slot: Slot) -> bool {
         self.tests += 1;
         self.frame.unfold(slot, &self.front.record(slot).bounds)
     }
@@ -289,13 +209,13 @@ impl<T: VertexTree, M: MeshSink, F: Watch> Steps<'_, T, M, F> {
         self.finder.watch(self.frame, slot, kind, self.front.bounds(slot));
     }
 
-    fn refused(&mut self, slot: Slot, kind: Kind) {
+    pub(super) fn refused(&mut self, slot: Slot, kind: Kind) {
         self.finder.unwatch(slot);
         self.finder.refused(slot, kind, self.front.bounds(slot));
     }
 
     /// Folds a collapsible node that no view wants. Parents that no view wants either follow, once they can.
-    fn fold(&mut self, (slot, node): Noted) -> Result<(), TreeError> {
+    pub(super) fn fold(&mut self, (slot, node): Noted) -> Result<(), TreeError> {
         if !is_collapsible(self.front, (slot, node)) {
             return Ok(());
         }
@@ -359,7 +279,7 @@ impl<T: VertexTree, M: MeshSink, F: Watch> Steps<'_, T, M, F> {
     /// Unfolds a boundary node that some view wants, and before it what the backend says it needs. Children that are
     /// wanted too follow.
     #[inline(always)]
-    fn unfold(&mut self, (slot, node): Noted) -> Result<(), TreeError> {
+    pub(super) fn unfold(&mut self, (slot, node): Noted) -> Result<(), TreeError> {
         if !is_boundary(self.front, (slot, node)) {
             return Ok(());
         }
@@ -374,62 +294,9 @@ impl<T: VertexTree, M: MeshSink, F: Watch> Steps<'_, T, M, F> {
         Ok(())
     }
 
-    /// Unfolds what waits on the stack, from the top.
-    #[cold]
-    fn unfold_needed(&mut self) -> Result<(), TreeError> {
-        while let Some(&Pending { slot, node, needed, .. }) = self.stack.last() {
-            let slot = if slot == Slot::NONE { self.front.find(self.tree, node) } else { slot };
-            if self.front.node(slot) == node && self.front.record(slot).is_active() {
-                self.stack.pop();
-                continue;
-            }
-            if !is_boundary(self.front, (slot, node)) {
-                // A needed node below folded ones: its ancestors come first.
-                let above = self.stack.len();
-                let (front, tree) = (&*self.front, &*self.tree);
-                let is_folded = |p: &NodeId| !front.record(front.find(tree, *p)).is_active();
-                self.stack.extend(tree.parents(node).filter(is_folded).map(Pending::needed));
-                if (above..self.stack.len()).any(|at| self.waits(self.stack[at].node)) {
-                    self.give_up(None);
-                } else {
-                    self.stack[above - 1].waits = true;
-                }
-                continue;
-            }
-            match self.tree.unfold(node, self.mesh)? {
-                Step::Done => {
-                    self.stack.pop();
-                    if needed && !self.wanted(slot) {
-                        self.counts.forced += 1;
-                    }
-                    self.unfolded(slot);
-                }
-                step => self.wait_or_give_up((slot, node), step),
-            }
-        }
-        Ok(())
-    }
-
-    /// The node on top of the stack has not been unfolded: what it needs goes on top of it, or it is left for later.
-    fn wait_or_give_up(&mut self, (slot, node): Noted, step: Step) {
-        match step {
-            Step::Needs(other) if !self.is_active(other) && !self.waits(other) => {
-                if let Some(pending) = self.stack.last_mut() {
-                    pending.waits = true;
-                }
-                self.stack.push(Pending::needed(other));
-                return;
-            }
-            Step::NotResident => return self.give_up(Some(node)),
-            Step::Blocked => self.blocked.push((slot, node)),
-            Step::Done | Step::Needs(_) | Step::StillNeeded => self.missing.push(node),
-        }
-        self.give_up(None);
-    }
-
     /// The backend has unfolded a node.
     #[inline(always)]
-    fn unfolded(&mut self, slot: Slot) {
+    pub(super) fn unfolded(&mut self, slot: Slot) {
         self.counts.unfolds += 1;
         self.finder.changed(slot);
         if T::IS_TREE {
@@ -479,37 +346,6 @@ impl<T: VertexTree, M: MeshSink, F: Watch> Steps<'_, T, M, F> {
             self.ready.iter().for_each(|&child| test(child));
         }
     }
-
-    fn is_active(&self, node: NodeId) -> bool {
-        self.front.record(self.front.find(self.tree, node)).is_active()
-    }
-
-    /// Whether a node waits for the one on top of the stack, directly or by way of others. To need it then is a cycle
-    /// of dependencies, which can only come from a damaged store.
-    fn waits(&self, node: NodeId) -> bool {
-        // What lies below an entry that nobody needs only waits for its turn.
-        let last = self.stack.iter().rposition(|pending| !pending.needed).unwrap_or(0);
-        self.stack[last..].iter().any(|pending| pending.waits && pending.node == node)
-    }
-
-    /// The node on top of the stack can not be unfolded in this frame, and with it nothing that waits for it. `awaited` is
-    /// the node whose page is missing, if that is why.
-    fn give_up(&mut self, awaited: Option<NodeId>) {
-        while let Some(Pending { slot, node, needed, .. }) = self.stack.pop() {
-            let slot = if slot == Slot::NONE { self.front.find(self.tree, node) } else { slot };
-            if is_boundary(self.front, (slot, node)) {
-                match awaited {
-                    None => self.refused(slot, Kind::Unfold),
-                    // What is only needed stays what it is; what needs it asks again.
-                    Some(_) if needed => {}
-                    Some(awaited) => self.wait_for((slot, node), Kind::Unfold, awaited),
-                }
-            }
-            if !needed {
-                break;
-            }
-        }
-    }
 }
 
 /// Looks up the nodes in some slots, before anything changes.
@@ -523,14 +359,14 @@ fn note(front: &Front, slots: &[Slot], noted: &mut Vec<Noted>) {
 
 /// Whether a node that was noted is still in its slot and collapsible.
 #[inline(always)]
-fn is_collapsible(front: &Front, (slot, node): Noted) -> bool {
+pub(super) fn is_collapsible(front: &Front, (slot, node): Noted) -> bool {
     let record = front.record(slot);
     record.node == node && record.is_collapsible()
 }
 
 /// Whether a node that was noted is still in its slot and a boundary node.
 #[inline(always)]
-fn is_boundary(front: &Front, (slot, node): Noted) -> bool {
+pub(super) fn is_boundary(front: &Front, (slot, node): Noted) -> bool {
     let record = front.record(slot);
     record.node == node && record.is_boundary()
 }
