@@ -234,10 +234,8 @@ impl StarMesh {
     /// star is at vertex `to`.
     #[inline(always)]
     fn merge_vertex<M: MeshSink>(&mut self, to: VertexId, from: VertexId, removed: u32, mesh: &mut M) {
-        match *self.stars.brought(from) {
-            // The rule.
-            [a, b] => [a, b].into_iter().for_each(|triangle| self.remove_brought(triangle, from, to, mesh)),
-            _ => self.remove_all_brought(from, to, mesh),
+        for at in 0..self.stars.brought(from).len() {
+            self.remove_brought(self.stars.brought(from)[at], from, to, mesh);
         }
         let triangles = &mut self.triangles;
         self.stars.merge(from, to, |corner| {
@@ -265,13 +263,6 @@ impl StarMesh {
         self.holes.push(slot);
         self.displayed -= 1;
         mesh.triangle_removed(slot);
-    }
-
-    #[cold]
-    fn remove_all_brought<M: MeshSink>(&mut self, from: VertexId, to: VertexId, mesh: &mut M) {
-        for at in 0..self.stars.brought(from).len() {
-            self.remove_brought(self.stars.brought(from)[at], from, to, mesh);
-        }
     }
 
     #[inline(always)]
