@@ -260,22 +260,22 @@ impl VertexTree for MappedTree {
         }
         Ok(())
     }
-    fn unfold<M: MeshSink>(&mut self, node: NodeId, _: &mut M) -> Result<Step, TreeError> {
+    fn unfold<M: MeshSink>(&mut self, node: NodeId, mesh: &mut M) -> Result<Step, TreeError> {
         let brought = self.brought(node);
         self.displayed += brought.len() as u64;
         if let Some(mut stars) = self.mesh.take() {
             let Node { first, pivot, .. } = self.nodes()[node.index()];
             let brought = self.corners()[brought].iter().map(|&leaves| LeafTriangle::new(leaves, 0, 0));
-            stars.split([first, pivot], self.places()[pivot as usize], brought);
+            stars.split([first, pivot], self.places()[pivot as usize], brought, mesh);
             self.mesh = Some(stars);
         }
         Ok(Step::Done)
     }
-    fn fold<M: MeshSink>(&mut self, node: NodeId, _: &mut M) -> Result<Step, TreeError> {
+    fn fold<M: MeshSink>(&mut self, node: NodeId, mesh: &mut M) -> Result<Step, TreeError> {
         self.displayed -= self.brought(node).len() as u64;
         let Node { first, pivot, .. } = self.nodes()[node.index()];
         if let Some(stars) = &mut self.mesh {
-            stars.merge([first, pivot]);
+            stars.merge([first, pivot], mesh);
         }
         Ok(Step::Done)
     }

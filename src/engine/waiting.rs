@@ -74,9 +74,10 @@ impl<T: VertexTree, M: MeshSink, F: Watch> Steps<'_, T, M, F> {
                 given_up.push(awaited);
                 continue;
             }
-            let (bounds, is_possible) = match kind {
-                Kind::Unfold => (record.bounds, record.is_boundary()),
-                Kind::Fold => (record.bounds, record.is_collapsible()),
+            let bounds = record.bounds;
+            let is_possible = match kind {
+                Kind::Unfold => record.is_boundary(),
+                Kind::Fold => record.is_collapsible(),
             };
             self.tests += 1;
             let is_wanted = is_possible && self.frame.unfold(slot, &bounds) == (kind == Kind::Unfold);

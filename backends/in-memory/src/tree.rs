@@ -124,23 +124,23 @@ impl VertexTree for InMemoryTree {
         Ok(())
     }
 
-    fn unfold<M: MeshSink>(&mut self, node: NodeId, _: &mut M) -> Result<Step, TreeError> {
+    fn unfold<M: MeshSink>(&mut self, node: NodeId, mesh: &mut M) -> Result<Step, TreeError> {
         let h = &*self.hierarchy;
         let brought = h.brought(node.index());
         self.displayed += brought.len() as u64;
         if let Some(stars) = self.mesh.as_mut().filter(|_| M::KEEPS_MESH) {
             let Node { kept, removed, .. } = h.nodes[node.index()];
-            stars.split([kept, removed], h.positions[node.index()], brought.iter().copied());
+            stars.split([kept, removed], h.positions[node.index()], brought.iter().copied(), mesh);
         }
         Ok(Step::Done)
     }
 
-    fn fold<M: MeshSink>(&mut self, node: NodeId, _: &mut M) -> Result<Step, TreeError> {
+    fn fold<M: MeshSink>(&mut self, node: NodeId, mesh: &mut M) -> Result<Step, TreeError> {
         let h = &*self.hierarchy;
         self.displayed -= h.brought(node.index()).len() as u64;
         if let Some(stars) = self.mesh.as_mut().filter(|_| M::KEEPS_MESH) {
             let Node { kept, removed, .. } = h.nodes[node.index()];
-            stars.merge([kept, removed]);
+            stars.merge([kept, removed], mesh);
         }
         Ok(Step::Done)
     }

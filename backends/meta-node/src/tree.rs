@@ -283,7 +283,7 @@ impl VertexTree for MetaNodeTree {
         let (start, end) = page.brought_range(slot);
         if let Some(stars) = &mut self.mesh {
             let brought = page.brought(slot).map(|leaves| LeafTriangle::new(leaves, 0, 0));
-            stars.split(leaves, of.position(), brought);
+            stars.split(leaves, of.position(), brought, mesh);
             // Rules look at the mesh as it is.
             if self.rules.is_some() {
                 stars.update(mesh);
@@ -319,7 +319,7 @@ impl VertexTree for MetaNodeTree {
         let (children, leaves @ [kept, _], collapse) = (of.children(), of.leaves(), of.log_number());
         let (start, end) = page.brought_range(slot);
         if let Some(stars) = &mut self.mesh {
-            stars.merge(leaves);
+            stars.merge(leaves, mesh);
             if let Some(rules) = &mut self.rules {
                 stars.update(mesh);
                 halves(node.0 - slot, page, of).into_iter().for_each(|half| rules.leave(half));

@@ -43,30 +43,46 @@ const TOGETHER: usize = 8;
 /// Steps before a change is made.
 const STEPS: usize = 4;
 
+/// Changes that wait at most: a first frame may make millions, and what waits should stay in a near cache.
+const MOST: usize = 1024;
+
 impl StarMesh {
-    /// A node has been unfolded: the vertex of leaf `removed` comes back, at `position` in object space, beside that of leaf
-    /// `kept`, and with it the triangles `brought`. The mesh follows at the next [`update`](Self::update).
+    /// A node has been unfolded: of two `leaves`, the vertex of the second comes back, at `position` in object space, beside that
+    /// of the first, and with it the triangles `brought`. The mesh follows at the next [`update`](Self::update), or when many
+    /// changes wait.
     #[inline]
-    pub fn split(
+    pub fn split<M: MeshSink>(
         &mut self,
-        [kept, removed]: [u32; 2],
+        leaves: [u32; 2],
         position: [f32; 3],
         brought: impl IntoIterator<Item = LeafTriangle>,
+        mesh: &mut M,
     ) {
         let start = self.coming.len() as u32;
         self.coming.extend(brought);
         let brought = [start, self.coming.len() as u32];
-        self.changes.push(Change::new([kept, removed], Some(position), brought));
+        self.note(Change::new(leaves, Some(position), brought), mesh);
     }
 
     /// A node has been folded: the inverse of [`split`](Self::split).
     #[inline]
-    pub fn merge(&mut self, [kept, removed]: [u32; 2]) {
-        self.changes.push(Change::new([kept, removed], None, [0; 2]));
+    pub fn merge<M: MeshSink>(&mut self, leaves: [u32; 2], mesh: &mut M) {
+        self.note(Change::new(leaves, None, [0; 2]), mesh);
+    }
+
+    #[inline(always)]
+    fn note<M: MeshSink>(&mut self, change: Change, mesh: &mut M) {
+        self.changes.push(change);
+        if self.changes.len() == MOST {
+            self.update(mesh);
+        }
     }
 
     /// Follows the changes since the last call, in their order, and reports what they change.
     pub fn update<M: MeshSink>(&mut self, mesh: &mut M) {
+        if self.changes.is_empty() {
+            return;
+        }
         let mut changes = std::mem::take(&mut self.changes);
         let coming = std::mem::take(&mut self.coming);
         let count = changes.len();
@@ -94,7 +110,7 @@ impl StarMesh {
                     prefetch(&self.triangles, corner.triangle() as usize);
                     mesh.prefetch(corner.triangle());
                 }
-                let brought = &coming[change.brought[0] as usize..change.brought[1] as usize];
+                let brought = change.brought(&coming);
                 for (far, triangle) in change.far.iter_mut().zip(brought) {
                     *far = self.shown.at_or_below(triangle.far_leaf()).unwrap_or(NONE);
                     self.vertex_of_leaf.prefetch(*far);
