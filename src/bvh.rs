@@ -409,7 +409,7 @@ mod tests {
     #[test]
     fn nothing_further_than_the_limit_is_found() {
         let positions = vec![[0.0, 0.0, 0.0], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0]];
-        let bvh = Bvh::new(&Mesh { positions, triangles: vec![[0, 1, 2]] });
+        let bvh = Bvh::new(&Mesh { positions, triangles: vec![[0, 1, 2]], ..Mesh::default() });
         let above = dvec3(0.25, 0.25, 2.0);
         assert_eq!(bvh.nearest(above, 1.9), None);
         assert_eq!(bvh.nearest(above, 2.0).unwrap().distance, 2.0);
@@ -436,6 +436,7 @@ mod tests {
         prop::collection::vec(prop::array::uniform3(point), 1..200).prop_map(|triangles| Mesh {
             triangles: (0..triangles.len() as u32).map(|t| [3 * t, 3 * t + 1, 3 * t + 2]).collect(),
             positions: triangles.into_iter().flatten().collect(),
+            ..Mesh::default()
         })
     }
 

@@ -40,7 +40,11 @@ impl Displayed {
     /// The displayed triangles over all vertices of the input mesh, used or not.
     #[must_use]
     pub fn mesh(&self, input: &Mesh) -> Mesh {
-        Mesh { positions: input.positions.clone(), triangles: self.corners(input).collect() }
+        Mesh {
+            positions: input.positions.clone(),
+            triangles: self.corners(input).collect(),
+            georeference: input.georeference.clone(),
+        }
     }
 
     /// The displayed triangles over the vertices that they use, numbered in the order of the input.
@@ -58,7 +62,7 @@ impl Displayed {
             }
         }
         let triangles = self.corners(input).map(|corners| corners.map(|v| number[v as usize])).collect();
-        Mesh { positions, triangles }
+        Mesh { positions, triangles, georeference: input.georeference.clone() }
     }
 
     fn corners<'a>(&'a self, input: &'a Mesh) -> impl Iterator<Item = [u32; 3]> + 'a {
@@ -112,7 +116,7 @@ mod tests {
                 bounds: Bounds { center: [0.0; 3], radius: 3.0, eps },
             })
             .to_vec();
-        CollapseLog { mesh: Mesh { positions, triangles }, collapses }
+        CollapseLog { mesh: Mesh { positions, triangles, ..Mesh::default() }, collapses }
     }
 
     #[test]

@@ -165,6 +165,7 @@ mod importing {
         Mesh {
             positions: corners.map(|[x, y, z]| [x + 10.0, y + 20.0, z - 5.0]).to_vec(),
             triangles: faces.to_vec(),
+            ..Mesh::default()
         }
     }
 

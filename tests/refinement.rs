@@ -155,7 +155,7 @@ fn nonsense(vertices: usize, triangles: usize, random: &mut Random) -> CollapseL
     let mut corner = || random.below(used) as u32;
     let mut triangles: Vec<[u32; 3]> = (0..triangles).map(|_| [corner(), corner(), corner()]).collect();
     triangles.extend_from_within(..triangles.len() / 10);
-    let mut log = random_log(Mesh { positions, triangles }, random);
+    let mut log = random_log(Mesh { positions, triangles, ..Mesh::default() }, random);
     // As many roots as come.
     log.collapses.truncate(vertices - 1 - random.below(vertices / 2));
     log

@@ -21,7 +21,7 @@ fn grid(n: u32, half: f32, z: impl Fn(f32, f32) -> f32) -> Mesh {
         let above = v + n + 1;
         [[v, v + 1, above + 1], [v, above + 1, above]]
     });
-    Mesh { positions: positions.collect(), triangles: triangles.collect() }
+    Mesh { positions: positions.collect(), triangles: triangles.collect(), ..Mesh::default() }
 }
 
 #[test]

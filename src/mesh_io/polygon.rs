@@ -62,7 +62,7 @@ impl Faces {
             let push = &mut |t: [u32; 3]| push_triangle(&mut triangles, t);
             triangulator.triangulate(corners, |i| positions[corners[i] as usize], push);
         }
-        Ok(Mesh { positions, triangles })
+        Ok(Mesh { positions, triangles, ..Mesh::default() })
     }
 }
 

@@ -45,6 +45,7 @@ pub(super) fn to_mesh(
     let mut mesh = Mesh {
         positions: Vec::with_capacity(cells + rows + columns),
         triangles: Vec::with_capacity(2 * cells),
+        ..Mesh::default()
     };
     send(grid, file, &mut mesh, progress)?;
     Ok(mesh)

@@ -45,7 +45,11 @@ mod tests {
 
     #[test]
     fn looks_at_the_middle_from_outside() {
-        let mesh = Mesh { positions: vec![[1.0, 2.0, 3.0], [5.0, 8.0, 9.0]], triangles: Vec::new() };
+        let mesh = Mesh {
+            positions: vec![[1.0, 2.0, 3.0], [5.0, 8.0, 9.0]],
+            triangles: Vec::new(),
+            ..Mesh::default()
+        };
         let path = around(&mesh);
         for frame in 0..path.frames.len() {
             let camera = path.camera(frame);

@@ -16,6 +16,7 @@ fn square(half: f32, depth: f32) -> Mesh {
     Mesh {
         positions: positions.map(|[x, y]| [x * half, y * half, -depth]).to_vec(),
         triangles: vec![[0, 1, 2], [0, 2, 3]],
+        ..Mesh::default()
     }
 }
 

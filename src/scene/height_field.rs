@@ -94,6 +94,7 @@ impl HeightField {
         let mut mesh = Mesh {
             positions: Vec::with_capacity(self.side * self.side),
             triangles: Vec::with_capacity(2 * cells * cells),
+            ..Mesh::default()
         };
         for row in 0..self.side {
             mesh.positions.extend((0..self.side).map(|column| self.sample(column, row).as_vec3().to_array()));

@@ -13,7 +13,7 @@ fn large(side: u32) -> Mesh {
     let positions = vertices.map(|(x, y)| [x as f32, y as f32, height(x, y)]).collect();
     let squares = (0..side - 1).flat_map(|y| (0..side - 1).map(move |x| y * side + x));
     let triangles = squares.flat_map(|v| [[v, v + 1, v + side + 1], [v, v + side + 1, v + side]]).collect();
-    Mesh { positions, triangles }
+    Mesh { positions, triangles, ..Mesh::default() }
 }
 
 fn with_large(side: u32) -> Workplace {

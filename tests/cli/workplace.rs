@@ -32,7 +32,7 @@ pub fn grid() -> Mesh {
     let positions = (0..144).map(|v| (v % 12, v / 12)).map(|(x, y)| [at(x), at(y), height(x, y)]).collect();
     let squares = (0..121).map(|s| s / 11 * 12 + s % 11);
     let triangles = squares.flat_map(|v| [[v, v + 1, v + 13], [v, v + 13, v + 12]]).collect();
-    Mesh { positions, triangles }
+    Mesh { positions, triangles, ..Mesh::default() }
 }
 
 /// A text PLY of four vertices and the given faces.

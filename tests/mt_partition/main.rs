@@ -42,7 +42,7 @@ fn bumpy_ball(levels: u32) -> Mesh {
     }
     let bump = |p: DVec3| 1.0 + 0.05 * (17.0 * p.x).sin() * (13.0 * p.y).sin() * (11.0 * p.z).cos();
     let positions = points.into_iter().map(|p| (p * bump(p)).as_vec3().to_array()).collect();
-    Mesh { positions, triangles }
+    Mesh { positions, triangles, ..Mesh::default() }
 }
 
 fn ball_log(levels: u32) -> CollapseLog {

@@ -180,10 +180,11 @@ fn the_same_input_gives_the_same_bytes() {
 fn next_to_nothing() {
     let meshes = [
         Mesh::default(),
-        Mesh { positions: vec![[0.0; 3]; 3], triangles: vec![] },
+        Mesh { positions: vec![[0.0; 3]; 3], ..Mesh::default() },
         Mesh {
             positions: vec![[0.0, 0.0, 0.0], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0]],
             triangles: vec![[0, 1, 2], [1, 1, 2]],
+            ..Mesh::default()
         },
     ];
     for mesh in meshes {

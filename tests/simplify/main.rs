@@ -124,7 +124,11 @@ fn is_deterministic() {
 fn drawn(positions: &[[f32; 3]], triangles: &[&str]) -> Mesh {
     let corner = |letter: char| letter as u32 - 'a' as u32;
     let triangle = |t: &&str| <[u32; 3]>::try_from(t.chars().map(corner).collect::<Vec<_>>()).unwrap();
-    Mesh { positions: positions.to_vec(), triangles: triangles.iter().map(triangle).collect() }
+    Mesh {
+        positions: positions.to_vec(),
+        triangles: triangles.iter().map(triangle).collect(),
+        ..Mesh::default()
+    }
 }
 
 /// A strip of `length` quads, its ends joined after half a turn if `twisted`, else after none.
@@ -178,7 +182,7 @@ fn difficult() -> Vec<(&'static str, Mesh)> {
     far_apart.positions.iter_mut().take(5).for_each(|p| p[0] = 1e30);
     let mut largest = flat_grid(4, 1.0);
     largest.positions.iter_mut().flatten().for_each(|x| *x = f32::MAX * (*x / 1.5 - 1.0));
-    let mut fan = Mesh { positions: vec![[0.0, 0.0, 1.0]], triangles: Vec::new() };
+    let mut fan = Mesh { positions: vec![[0.0, 0.0, 1.0]], triangles: Vec::new(), ..Mesh::default() };
     for i in 0..200 {
         let turn = i as f32 / 200.0 * std::f32::consts::TAU;
         fan.positions.push([turn.cos(), turn.sin(), 0.0]);
@@ -186,7 +190,10 @@ fn difficult() -> Vec<(&'static str, Mesh)> {
     }
     vec![
         ("nothing", Mesh::default()),
-        ("vertices alone", Mesh { positions: vec![[1.0, 2.0, 3.0]; 5], triangles: Vec::new() }),
+        (
+            "vertices alone",
+            Mesh { positions: vec![[1.0, 2.0, 3.0]; 5], triangles: Vec::new(), ..Mesh::default() },
+        ),
         ("one triangle", drawn(&SQUARE, &["abc"])),
         ("a square", drawn(&SQUARE, &["abc", "acd"])),
         // a---b   Two triangles that share vertex c alone.

@@ -175,7 +175,7 @@ impl<S: Storage> Renumbered<S> {
     /// The extent of the mesh: see [`Mesh::extent`](vertex_tree::Mesh::extent).
     pub fn extent(&self) -> f64 {
         let positions = self.corners.to_vec();
-        vertex_tree::Mesh { positions, triangles: Vec::new() }.extent()
+        vertex_tree::Mesh { positions, ..vertex_tree::Mesh::default() }.extent()
     }
 }
 

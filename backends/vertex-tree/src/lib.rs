@@ -17,6 +17,7 @@
 mod bounds;
 mod curve;
 pub mod external;
+mod georeference;
 mod leaf_map;
 mod leaf_set;
 mod log;
@@ -35,6 +36,7 @@ mod tree;
 
 pub use bounds::{Bounds, NormalCone};
 pub use curve::z_order;
+pub use georeference::{DegreeMap, Georeference, Rounding};
 pub use log::{Collapse, CollapseLog, Forest, LogError, NONE};
 pub use log_file::{LogCounts, LogFileError, read_log, write_log, write_log_from};
 pub use log_source::{LogFile, LogSource, Records};

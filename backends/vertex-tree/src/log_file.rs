@@ -322,7 +322,7 @@ pub fn read_log(path: &Path) -> Result<CollapseLog, LogFileError> {
     let (collapses, collapses_sum) = read_section(&mut input, counts.collapses, collapse).map_err(io)?;
     let (sums, _) = read_section(&mut input, 3, |[w]: [u32; 1]| w).map_err(io)?;
     compare_checksums(path, [positions_sum, triangles_sum, collapses_sum], &sums, starts)?;
-    let log = CollapseLog { mesh: Mesh { positions, triangles }, collapses };
+    let log = CollapseLog { mesh: Mesh { positions, triangles, ..Mesh::default() }, collapses };
     log.forest().map_err(|source| LogFileError::Log { file: path.to_owned(), source })?;
     Ok(log)
 }

@@ -152,6 +152,7 @@ mod tests {
             mesh: Mesh {
                 positions: (0..count).map(position).collect(),
                 triangles: (2..count).map(|v| [v - 2, v - 1, v]).collect(),
+                ..Mesh::default()
             },
             collapses: (1..count).map(|v| Collapse { removed: v, kept: 0, bounds: bounds(v) }).collect(),
         };

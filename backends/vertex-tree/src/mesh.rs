@@ -1,15 +1,19 @@
 //! An indexed triangle mesh.
 
+use crate::Georeference;
+
 /// Triangles over shared vertices: the input of the simplification, and what a fully refined front shows again.
 ///
 /// Nothing is promised of the topology: holes, several components, non-manifold edges, doubled and zero-area
 /// triangles all occur in real input. Every index is less than `positions.len()` and every coordinate is finite.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Mesh {
-    /// Vertex positions in object space.
+    /// Vertex positions, relative to the origin of [`georeference`](Self::georeference).
     pub positions: Vec<[f32; 3]>,
     /// Vertex indices of each triangle, counter-clockwise seen from its front.
     pub triangles: Vec<[u32; 3]>,
+    /// Where the mesh lies in the world.
+    pub georeference: Georeference,
 }
 
 impl Mesh {

@@ -24,6 +24,7 @@ fn square() -> CollapseLog {
         mesh: Mesh {
             positions: vec![[0.0, 0.0, 0.0], [1.0, 0.0, 0.0], [1.0, 1.0, 0.0], [0.0, 1.0, -0.0]],
             triangles: vec![[0, 1, 2], [0, 2, 3]],
+            ..Mesh::default()
         },
         collapses: vec![collapse(3, 2, 0.0), collapse(2, 0, 0.125)],
     }
@@ -118,6 +119,7 @@ fn what_is_written_is_read() {
         mesh: Mesh {
             positions: (0..count).map(|v| [v, v + 1, v + 2].map(coordinate)).collect(),
             triangles: (0..2 * count).map(|t| [t % count, t / 3, (t / 7) % count]).collect(),
+            ..Mesh::default()
         },
         collapses: (1..count)
             .map(|v| Collapse {
@@ -127,10 +129,8 @@ fn what_is_written_is_read() {
             })
             .collect(),
     };
-    let lone = CollapseLog {
-        mesh: Mesh { positions: vec![[1.0, 2.0, 3.0]], triangles: Vec::new() },
-        collapses: vec![],
-    };
+    let lone =
+        CollapseLog { mesh: Mesh { positions: vec![[1.0, 2.0, 3.0]], ..Mesh::default() }, collapses: vec![] };
     for log in [CollapseLog::default(), lone, square(), long] {
         let bytes = place.written(&log);
         let read = read_log(&place.file).unwrap();

@@ -173,7 +173,7 @@ fn options_out_of_range_are_an_error() {
 
 #[test]
 fn an_empty_mesh_and_one_that_is_all_degenerate() {
-    let one = Mesh { positions: vec![[0.0; 3]; 3], triangles: vec![[0, 0, 1], [2, 2, 2]] };
+    let one = Mesh { positions: vec![[0.0; 3]; 3], triangles: vec![[0, 0, 1], [2, 2, 2]], ..Mesh::default() };
     for mesh in [Mesh::default(), one] {
         let log = CollapseLog { mesh, collapses: Vec::new() };
         let file = open(bytes_of(&Arrangement::new(&log, &BuildOptions::default()).unwrap()));

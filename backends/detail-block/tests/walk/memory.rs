@@ -36,7 +36,11 @@ fn shuffled(mesh: &Mesh, random: &mut Random) -> Mesh {
     for (&to, &position) in order.iter().zip(&mesh.positions) {
         positions[to as usize] = position;
     }
-    Mesh { positions, triangles: triangles.iter().map(|t| t.map(|v| order[v as usize])).collect() }
+    Mesh {
+        positions,
+        triangles: triangles.iter().map(|t| t.map(|v| order[v as usize])).collect(),
+        ..Mesh::default()
+    }
 }
 
 fn names(folder: &Path) -> Vec<String> {

@@ -64,7 +64,7 @@ fn any_log() -> impl Strategy<Value = CollapseLog> {
             }
         }
         let positions = (0..24).map(|v| [v as f32, (v * v % 7) as f32, 0.0]).collect();
-        CollapseLog { mesh: Mesh { positions, triangles }, collapses }
+        CollapseLog { mesh: Mesh { positions, triangles, ..Mesh::default() }, collapses }
     })
 }
 
