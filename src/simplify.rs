@@ -2,6 +2,7 @@
 
 mod ball;
 mod candidates;
+mod edge_lengths;
 mod faces;
 mod key_counts;
 mod legality;
@@ -10,9 +11,11 @@ mod nodes;
 mod order;
 mod out_of_core;
 mod quadric;
+mod remains;
 mod rounds;
 mod samples;
 mod spatial_order;
+mod stall;
 mod surface;
 mod virtual_edges;
 
@@ -25,12 +28,15 @@ use vertex_tree::{Collapse, CollapseLog, LogError, Mesh};
 
 use crate::progress::Progress;
 pub use out_of_core::{LEAST_MEMORY, Limits, MOST_THREADS, OutOfCoreError, build_within};
+pub use remains::Remains;
 
+use edge_lengths::EdgeLengths;
 use marks::Marks;
 use nodes::{Nodes, round_up};
 use quadric::Quadric;
 use rounds::Builder;
-use surface::Surface;
+use stall::Stall;
+use surface::{Neighbour, Surface};
 
 /// How to simplify.
 #[derive(Clone, Debug, Default, PartialEq)]
@@ -74,6 +80,8 @@ pub struct Report {
     pub collapses: usize,
     /// Rounds of independent collapses, in order.
     pub rounds: Vec<Round>,
+    /// Rounds in all, with those in which candidates were found illegal or dearer than they seemed, and none was collapsed.
+    pub attempted_rounds: usize,
     /// Roots of the forest.
     pub roots: usize,
     /// Depth of the forest.
@@ -82,6 +90,8 @@ pub struct Report {
     pub dependency_depth: u32,
     /// Triangles of the base mesh.
     pub base_triangles: usize,
+    /// Why these are not simplified further.
+    pub remains: Remains,
     /// The largest error of a node, in object units.
     pub largest_eps: f32,
     /// Collapses whose key was less than that of an earlier one.
@@ -109,28 +119,30 @@ pub fn build(mesh: Mesh, options: &Options, progress: Progress) -> Result<(Colla
     log.forest()?;
     let mesh = &log.mesh;
     let extent = mesh.extent();
-    // Work in units in which all coordinates are below 1. A power of two changes no bit of the mantissas.
-    let largest = mesh.positions.iter().flatten().fold(0.0_f32, |largest, x| x.abs().max(largest));
-    let scale = power_of_two_above(largest);
-    let scaled: Vec<Vec3> =
-        mesh.positions.iter().map(|&p| (DVec3::from(p.map(f64::from)) / scale).as_vec3()).collect();
+    let given: Vec<Vec3> = mesh.positions.iter().map(|&p| p.into()).collect();
+    let mut lengths = EdgeLengths::new();
+    for t in mesh.triangles.iter().filter(|t| !is_flat(**t)) {
+        lengths.add(t.map(|v| given[v as usize]));
+    }
+    let unit = lengths.unit();
 
     // `order[new] = input number`.
-    let order = spatial_order::spatial_order(&scaled);
+    let order = spatial_order::spatial_order(&given);
     let mut number = vec![0; order.len()];
     for (new, &old) in (0..).zip(&order) {
         number[old as usize] = new;
     }
-    let positions: Vec<Vec3> = order.iter().map(|&old| scaled[old as usize]).collect();
+    let positions: Vec<Vec3> = order.iter().map(|&old| given[old as usize]).collect();
+    drop(given);
     let leaf_radius = leaf_radii(mesh, &number);
     let mut surface = Surface::new(positions, &coherent_triangles(&mesh.triangles, &number));
     let mut marks = Marks::new(order.len());
     let mut neighbours = Vec::new();
     for i in 0..surface.live.len() {
-        set_initial_quadric(surface.live[i], &mut surface, &mut marks, &mut neighbours);
+        set_initial_quadric(surface.live[i], unit, &mut surface, &mut marks, &mut neighbours);
     }
-    let nodes = Nodes::new(leaf_radius, extent);
-    let mut builder = Builder::new(surface, nodes, marks, options.merge_components, scale);
+    let nodes = Nodes::new(leaf_radius, extent, unit);
+    let mut builder = Builder::new(surface, nodes, marks, options.merge_components, unit);
     builder.begin();
     let preparation = start.elapsed();
 
@@ -138,6 +150,7 @@ pub fn build(mesh: Mesh, options: &Options, progress: Progress) -> Result<(Colla
     let all = builder.surface.live.len();
     let mut rounds = Vec::new();
     let run = builder.run(
+        Stall::default(),
         all,
         order.len() as u32,
         |v| v,
@@ -147,10 +160,11 @@ pub fn build(mesh: Mesh, options: &Options, progress: Progress) -> Result<(Colla
             Ok::<(), Infallible>(())
         },
     );
-    let Ok(()) = run;
+    let Ok(attempted_rounds) = run;
     let simplification = start.elapsed();
 
     let start = Instant::now();
+    let remains = builder.remains();
     let nodes = &builder.nodes;
     let (sequence, rounds, inversions) = sequence(&nodes.keys, &rounds);
     let collapses = sequence.iter().map(|&node| {
@@ -163,10 +177,12 @@ pub fn build(mesh: Mesh, options: &Options, progress: Progress) -> Result<(Colla
         triangles: log.mesh.triangles.len(),
         collapses: log.collapses.len(),
         rounds,
+        attempted_rounds,
         roots: forest.roots().count(),
         tree_depth: forest.depth(),
         dependency_depth: nodes.depth.iter().copied().max().unwrap_or(0),
         base_triangles: builder.surface.live_triangles,
+        remains,
         largest_eps: log.collapses.iter().fold(0.0, |largest, c| c.bounds.eps.max(largest)),
         inversions,
         windows: 0,
@@ -200,14 +216,11 @@ fn sequence(keys: &[f32], rounds: &[(Range<u32>, f32)]) -> (Vec<u32>, Vec<Round>
 }
 
 /// Weight of a plane that holds a boundary edge in place, per squared length of the edge.
-const BOUNDARY_WEIGHT: f32 = 4.0;
+const BOUNDARY_WEIGHT: f64 = 4.0;
 
-/// The least power of two that is above `x`, which is not negative; 1 for 0.
-fn power_of_two_above(x: f32) -> f64 {
-    const EXPONENT: u64 = 0x7ff << 52;
-    // Every single-precision number but 0 has an exponent of its own in double precision.
-    let power = f64::from_bits(f64::from(x).to_bits() & EXPONENT);
-    if x > 0.0 { 2.0 * power } else { 1.0 }
+/// A weight in single precision. The sums of a few thousand such weights, times a length, are finite still.
+fn bounded_weight(weight: f64) -> f32 {
+    weight.min(1e30) as f32
 }
 
 /// For each vertex in the new numbering, its distance to the farthest corner of its triangles, in object units.
@@ -258,25 +271,38 @@ fn coherent_triangles(triangles: &[[u32; 3]], number: &[u32]) -> Vec<[u32; 3]> {
 
 /// Gives `v` the planes of the triangles around it, weighted by area, and at edges that do not join exactly two triangles
 /// a plane through the edge, upright on the triangle. Also finds whether the vertex has such edges.
-fn set_initial_quadric(v: u32, surface: &mut Surface, marks: &mut Marks, neighbours: &mut Vec<(u32, u32)>) {
+fn set_initial_quadric(
+    v: u32,
+    unit: f64,
+    surface: &mut Surface,
+    marks: &mut Marks,
+    neighbours: &mut Vec<Neighbour>,
+) {
     let mut quadric = Quadric::default();
+    // In double precision no product of four lengths vanishes or overflows.
+    let area = 0.5 / (unit * unit);
     for spoke in surface.spokes(v) {
         let [a, b, c] = surface.triangles[spoke.triangle as usize].corners;
         let normal = surface.normal(a, b, c);
         let length = normal.length();
         if length > 0.0 {
-            quadric.add_plane(normal / length, 0.5 * length, 0.5 * length);
+            let weight = bounded_weight(area * length);
+            quadric.add_plane((normal / length).as_vec3(), weight, weight);
         }
     }
     if !surface.is_surrounded(v) {
         surface.neighbours(v, marks, neighbours);
-        for &(w, _) in neighbours.iter().filter(|&&(_, triangles)| triangles != 2) {
-            surface.special[v as usize] = true;
-            let edge = surface.position(w) - surface.position(v);
-            let weight = BOUNDARY_WEIGHT * edge.length_squared();
-            for s in surface.spokes(v).filter(|s| s.touches(w)) {
+        surface.special[v as usize] = neighbours.iter().any(|n| !n.is_regular());
+        marks.clear();
+        for n in neighbours.iter().filter(|n| n.triangles != 2) {
+            marks.set(n.vertex, 0);
+        }
+        for s in surface.spokes(v) {
+            for w in [s.next, s.last].into_iter().filter(|&w| marks.get(w).is_some()) {
+                let edge = surface.position(w).as_dvec3() - surface.position(v).as_dvec3();
+                let weight = BOUNDARY_WEIGHT * edge.length_squared() / (unit * unit);
                 let upright = edge.cross(surface.normal(v, s.next, s.last)).normalize_or_zero();
-                quadric.add_plane(upright, weight, 0.0);
+                quadric.add_plane(upright.as_vec3(), bounded_weight(weight), 0.0);
             }
         }
     }

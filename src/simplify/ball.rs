@@ -23,6 +23,8 @@ pub(super) fn radius_around(center: DVec3, balls: &[Ball]) -> f64 {
 
 /// How often the centre is moved at most.
 const STEPS: u32 = 12;
+/// Of more balls not all pairs are looked at, but only those with the largest.
+const MOST_IN_PAIRS: usize = 128;
 
 /// A centre around which all `balls` can be contained with a radius close to the least possible. Balls that lie inside
 /// the largest are dropped from the list.
@@ -38,7 +40,8 @@ pub(super) fn enclosing_center(balls: &mut Vec<Ball>) -> DVec3 {
     balls.retain(|b| b.reach(largest.center) > largest.radius);
     balls.push(largest);
     let (mut least, mut center) = (largest.radius, largest.center);
-    for (i, a) in balls.iter().enumerate() {
+    let first = if balls.len() > MOST_IN_PAIRS { balls.len() - 1 } else { 0 };
+    for (i, a) in balls.iter().enumerate().skip(first) {
         for b in &balls[..i] {
             let apart = a.center.distance(b.center);
             let radius = 0.5 * (apart + a.radius + b.radius);

@@ -14,7 +14,7 @@ use vertex_tree::NONE;
 use super::key_counts::KeyCounts;
 use super::marks::Marks;
 use super::quadric::Quadric;
-use super::surface::Surface;
+use super::surface::{Neighbour, Surface};
 
 /// Part of the squared length of an edge that is added to the squared distance.
 const LENGTH_TERM: f32 = 1e-4;
@@ -58,19 +58,30 @@ pub(super) struct Candidates {
     pub state: Vec<State>,
     /// That of the current round.
     pub parity: Parity,
-    /// The neighbours of one vertex, and the number of triangles at the edge to each.
-    neighbours: Vec<(u32, u32)>,
+    /// Whether anything has become known in the round that was not before.
+    pub changed: bool,
+    /// The reciprocal of a unit of the simplification in object units.
+    per_unit: f32,
+    /// The neighbours of one vertex.
+    neighbours: Vec<Neighbour>,
     /// Edges of one vertex with their keys.
     edges: Vec<(f32, u32)>,
 }
 
+/// Triangles that may be looked at to find a legal edge of one vertex: of one with thousands not all edges are tried, but the
+/// cheapest, and again when it has lost some.
+const MOST_LOOKED_AT: usize = 1 << 16;
+
 impl Candidates {
-    pub fn new(count: usize) -> Candidates {
+    /// `unit` is the length of a unit of the simplification in object units.
+    pub fn new(count: usize, unit: f64) -> Candidates {
         Candidates {
             key: vec![0.0; count],
             target: vec![NONE; count],
             state: vec![State::Outdated(Parity::Odd); count],
             parity: Parity::Even,
+            changed: false,
+            per_unit: (1.0 / unit) as f32,
             neighbours: Vec::new(),
             edges: Vec::new(),
         }
@@ -80,9 +91,29 @@ impl Candidates {
     pub fn visit(&mut self, v: u32, surface: &mut Surface, marks: &mut Marks) {
         match self.state[v as usize] {
             State::Outdated(parity) if parity != self.parity => self.refresh(v, surface, marks),
-            State::Updated(parity) if parity != self.parity => self.state[v as usize] = State::Cheapest,
+            State::Updated(parity) if parity != self.parity => {
+                self.state[v as usize] = State::Cheapest;
+                self.changed = true;
+            }
             _ => {}
         }
+    }
+
+    /// That of `v` is not there any more: it is found anew in the next round.
+    pub fn forget(&mut self, v: u32) {
+        self.state[v as usize] = State::Outdated(self.parity);
+        self.changed = true;
+    }
+
+    /// There is no edge along which `v` could be removed, as far as is known now.
+    pub fn give_up(&mut self, v: u32) {
+        self.state[v as usize] = State::Nothing;
+        self.changed = true;
+    }
+
+    /// Vector from one vertex to another, in units of the simplification.
+    fn way(&self, from: u32, to: u32, surface: &Surface) -> Vec3 {
+        (surface.position(to) - surface.position(from)) * self.per_unit
     }
 
     /// Finds the cheapest edge of `v`.
@@ -93,16 +124,11 @@ impl Candidates {
             self.set(v, cheapest, State::Cheapest);
             return;
         }
-        // Triangles close up around `v`, so every neighbour comes next in one of them. Where orientations disagree
-        // one may be missed here.
-        let (position, quadric) = (surface.position(v), &surface.quadrics[v as usize]);
-        let neighbours = surface
-            .spokes(v)
-            .map(|spoke| (edge_key(quadric, surface.position(spoke.next) - position), spoke.next));
-        let partners = surface
-            .virtual_edges
-            .partners(v)
-            .map(|w| (virtual_key(quadric, surface.position(w) - position), w));
+        // Triangles close up around `v`, so every neighbour comes next in one of them.
+        let quadric = &surface.quadrics[v as usize];
+        let neighbours = surface.spokes(v).map(|s| (edge_key(quadric, self.way(v, s.next, surface)), s.next));
+        let partners = surface.virtual_edges.partners(v);
+        let partners = partners.map(|w| (virtual_key(quadric, self.way(v, w, surface)), w));
         let cheapest = neighbours.chain(partners).reduce(cheaper);
         self.set(v, cheapest, State::Cheapest);
     }
@@ -118,15 +144,16 @@ impl Candidates {
     ) {
         self.find_edges(v, surface, marks);
         self.edges.sort_unstable_by(|a, b| a.0.total_cmp(&b.0).then(a.1.cmp(&b.1)));
-        let legal = self.edges.iter().copied().find(|&(_, u)| is_legal(u, surface, marks));
+        let most = MOST_LOOKED_AT / surface.star_length(v).max(1);
+        let legal = self.edges.iter().copied().take(most.max(4)).find(|&(_, u)| is_legal(u, surface, marks));
         if legal.is_some() || !force {
             self.set(v, legal, State::Legal);
             return;
         }
-        let neighbours = self.neighbours.iter().map(|&(u, _)| u);
+        let neighbours = self.neighbours.iter().map(|n| n.vertex);
         let shortest = neighbours
             .chain(surface.virtual_edges.partners(v))
-            .map(|u| (surface.position(v).distance_squared(surface.position(u)), u))
+            .map(|u| (self.way(v, u, surface).length_squared().min(f32::MAX), u))
             .reduce(cheaper);
         self.set(v, shortest, State::Forced);
     }
@@ -134,19 +161,21 @@ impl Candidates {
     /// Finds all edges along which `v` may be removed as far as its own star can say.
     fn find_edges(&mut self, v: u32, surface: &mut Surface, marks: &mut Marks) {
         surface.neighbours(v, marks, &mut self.neighbours);
+        surface.special[v as usize] = self.neighbours.iter().any(|n| !n.is_regular());
         // A vertex on a boundary, or on a seam where more than two triangles meet, stays on it.
-        let special = self.neighbours.iter().any(|&(_, triangles)| triangles != 2);
-        surface.special[v as usize] = special;
-        let (position, quadric) = (surface.position(v), &surface.quadrics[v as usize]);
-        self.edges.clear();
-        for &(u, triangles) in &self.neighbours {
-            if !special || triangles != 2 || surface.joined[v as usize] {
-                self.edges.push((edge_key(quadric, surface.position(u) - position), u));
+        let is_bound = self.neighbours.iter().any(|n| n.triangles != 2);
+        let mut edges = std::mem::take(&mut self.edges);
+        let quadric = &surface.quadrics[v as usize];
+        edges.clear();
+        for n in &self.neighbours {
+            if !is_bound || n.triangles != 2 || surface.joined[v as usize] {
+                edges.push((edge_key(quadric, self.way(v, n.vertex, surface)), n.vertex));
             }
         }
         for w in surface.virtual_edges.partners(v) {
-            self.edges.push((virtual_key(quadric, surface.position(w) - position), w));
+            edges.push((virtual_key(quadric, self.way(v, w, surface)), w));
         }
+        self.edges = edges;
     }
 
     /// Brings the candidate of `w` up to date after its neighbour `lost` has merged into `gained`.
@@ -158,7 +187,7 @@ impl Candidates {
             return;
         }
         // The other edges of `w` are what they were.
-        let key = edge_key(&surface.quadrics[i], surface.position(gained) - surface.position(w));
+        let key = edge_key(&surface.quadrics[i], self.way(w, gained, surface));
         (self.key[i], self.target[i]) = cheaper((self.key[i], self.target[i]), (key, gained));
         self.state[i] = State::Updated(self.parity);
     }
@@ -174,6 +203,7 @@ impl Candidates {
         let i = v as usize;
         (self.key[i], self.target[i]) = candidate.unwrap_or((f32::INFINITY, NONE));
         self.state[i] = if candidate.is_some() { state } else { State::Nothing };
+        self.changed = true;
     }
 }
 

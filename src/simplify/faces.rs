@@ -12,6 +12,8 @@
 //! four triangles at a time and without branches. To tell first in which region around the triangle the point lies
 //! (Ericson, "Real-time collision detection", 2005, 5.1.5) takes fewer operations, but no processor can guess the way.
 
+use std::ops::Range;
+
 use glam::{Vec3, Vec4};
 
 /// Four triangles, a coordinate in each `Vec4`. Lanes that are not in use hold triangles that are a single point, a
@@ -38,6 +40,11 @@ type Lanes = [Vec4; 3];
 
 /// A sliver whose height is less than this part of its length is measured by its edges alone; squared.
 const SLIVER: f32 = 1e-10;
+
+/// With more triangles than this, not all are looked at for each of thousands of points, but those of so many fours on
+/// either side in their order, which is one in space.
+const MANY: usize = 128;
+const BESIDE: usize = 4;
 
 /// A few triangles.
 #[derive(Debug, Default)]
@@ -73,12 +80,25 @@ impl Faces {
         self.fours.iter_mut().for_each(Four::prepare);
     }
 
+    /// Of more triangles than [`MANY`], which of the fours are looked at for a point beside one of them.
+    fn range(&self, beside: Option<usize>) -> Range<usize> {
+        match beside {
+            Some(beside) if self.count > MANY => {
+                let middle = (beside / 4).min(self.fours.len() - 1);
+                middle.saturating_sub(BESIDE)..(middle + BESIDE + 1).min(self.fours.len())
+            }
+            _ => 0..self.fours.len(),
+        }
+    }
+
     /// The nearest triangle, the first one if several are, and its squared distance. Without triangles, 0
-    /// and infinity.
-    pub fn nearest(&self, p: Vec3) -> (u32, f32) {
-        let mut nearest = (0, f32::INFINITY);
-        let mut number = 0;
-        for four in &self.fours {
+    /// and infinity. Of many triangles those in the order near the one with number `beside`, if that is given: what is nearest
+    /// is no farther away.
+    pub fn nearest(&self, p: Vec3, beside: Option<usize>) -> (u32, f32) {
+        let range = self.range(beside);
+        let mut nearest = (4 * range.start as u32, f32::INFINITY);
+        let mut number = nearest.0;
+        for four in &self.fours[range] {
             for distance_squared in four.distances_squared(p).to_array() {
                 if distance_squared < nearest.1 {
                     nearest = (number, distance_squared);
@@ -89,10 +109,11 @@ impl Faces {
         nearest
     }
 
-    /// Squared distance to the nearest triangle, or any value up to `enough` once one has been found that near.
-    pub fn distance_squared(&self, p: Vec3, enough: f32) -> f32 {
+    /// Squared distance to the nearest triangle, or any value up to `enough` once one has been found that near. Of many
+    /// triangles only some are looked at, as in [`nearest`](Self::nearest).
+    pub fn distance_squared(&self, p: Vec3, enough: f32, beside: usize) -> f32 {
         let mut nearest = f32::INFINITY;
-        for four in &self.fours {
+        for four in &self.fours[self.range(Some(beside))] {
             nearest = nearest.min(four.distances_squared(p).min_element());
             if nearest <= enough {
                 break;

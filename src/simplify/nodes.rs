@@ -30,14 +30,18 @@ use super::ball::{Ball, enclosing_center, radius_around};
 /// By this part a sphere is larger than it need be, so that rounding in a later test can not invert parent and
 /// child. Twice 2^-20, because the promise is in terms of the larger radius.
 const RELATIVE_SLACK: f64 = 1.0 / (1 << 19) as f64;
-/// And by this part of the extent of the mesh.
+/// And by this part of the extent of the mesh,
 const ABSOLUTE_SLACK: f64 = 1.0 / (1_u64 << 40) as f64;
+/// but at most by this part of an edge, however far out a single vertex lies. It is needed where the eye is so far away that
+/// 2^-20 of a radius drowns in the rounding of the distance, which is 2^-52 of that: beyond 2^30 radii, where nothing is wanted
+/// unless `k` is as large.
+const LARGEST_SLACK: f64 = 1.0 / (1 << 10) as f64;
 
 /// The nodes made so far, in object units.
 #[derive(Debug)]
 pub(super) struct Nodes {
     pub collapses: Vec<Collapse>,
-    /// For each node, the key of its collapse.
+    /// For each node, the key of its collapse, or more: see [`add`](Self::add).
     pub keys: Vec<f32>,
     /// For each node, its number in the whole construction, where only some are here, in any order.
     pub ids: Option<Vec<u32>>,
@@ -59,8 +63,8 @@ pub(super) struct Nodes {
 }
 
 impl Nodes {
-    /// `extent` is the diagonal of the mesh's bounding box.
-    pub fn new(leaf_radius: Vec<f32>, extent: f64) -> Nodes {
+    /// `extent` is the diagonal of the mesh's bounding box, `unit` about the median length of an edge.
+    pub fn new(leaf_radius: Vec<f32>, extent: f64, unit: f64) -> Nodes {
         Nodes {
             collapses: Vec::with_capacity(leaf_radius.len()),
             keys: Vec::with_capacity(leaf_radius.len()),
@@ -71,7 +75,7 @@ impl Nodes {
             top: vec![NONE; leaf_radius.len()],
             trace: vec![NONE; leaf_radius.len()],
             leaf_radius,
-            slack: extent * ABSOLUTE_SLACK,
+            slack: (extent * ABSOLUTE_SLACK).min(unit * LARGEST_SLACK),
             predecessors: Vec::new(),
             balls: Vec::new(),
         }
@@ -94,7 +98,9 @@ impl Nodes {
 
     /// Makes the node of a collapse, unless its sphere is too large for single precision, and says whether it has.
     /// `creators` are the collapses that last changed the triangles around `removed`, `NONE` for untouched ones;
-    /// `bereaved` are the vertices that lose a triangle and get none; `positions` are those of the two vertices.
+    /// `bereaved` are the vertices that lose a triangle and get none; `positions` are those of the two vertices. The round's
+    /// first node has the number `first` in the whole construction: where the collapse depends on another of the round, its
+    /// key is no less than that one's, so that the order of keys is one in which they can be made.
     pub fn add(
         &mut self,
         [removed, kept]: [u32; 2],
@@ -103,6 +109,7 @@ impl Nodes {
         bereaved: &[u32],
         error: f32,
         key: f32,
+        first: u32,
     ) -> bool {
         self.predecessors.clear();
         self.balls.clear();
@@ -125,12 +132,15 @@ impl Nodes {
             self.predecessors.sort_unstable();
             self.predecessors.dedup();
         }
-        let (mut eps, mut depth) = (error, 0);
+        let (mut eps, mut depth, mut key) = (error, 0, key);
         for &node in &self.predecessors {
             let b = self.collapses[node as usize].bounds;
             self.balls.push(Ball { center: b.center.map(f64::from).into(), radius: f64::from(b.radius) });
             eps = eps.max(b.eps);
             depth = depth.max(self.depth[node as usize]);
+            if self.is_from(node, first) {
+                key = key.max(self.keys[node as usize]);
+            }
         }
         let center = enclosing_center(&mut self.balls).as_vec3();
         let radius = radius_around(center.as_dvec3(), &self.balls);

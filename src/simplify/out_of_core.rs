@@ -163,10 +163,12 @@ pub fn build_within(
     })
     .map_err(temporary)?;
     let whole = Whole {
-        scale: input.scale(),
+        unit: input.lengths.unit(),
         extent: input.extent(),
         live_triangles,
         first_id: 0,
+        gives_up: false,
+        leans: false,
         parity: FIRST_PARITY,
         merge: false,
     };
@@ -191,6 +193,8 @@ pub fn build_within(
         windows: 0,
         loaded: 0,
         roots: 0,
+        remains: super::Remains::default(),
+        rounds: 0,
     };
     passes.begin().map_err(temporary)?;
     let preparation = start.elapsed();
@@ -215,10 +219,12 @@ pub fn build_within(
         triangles: triangles as usize,
         collapses: collapses as usize,
         rounds: std::mem::take(&mut log.rounds),
+        attempted_rounds: passes.rounds,
         roots: passes.roots,
         tree_depth: log.tree_depth,
         dependency_depth: log.dependency_depth,
         base_triangles,
+        remains: passes.remains,
         largest_eps: log.largest_eps,
         inversions: log.inversions,
         windows: passes.windows,

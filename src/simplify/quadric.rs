@@ -41,9 +41,13 @@ impl Quadric {
         )
     }
 
-    /// The mean squared distance of the point at `d` from the carrying vertex to the planes, per area.
+    /// The mean squared distance of the point at `d` from the carrying vertex to the planes, per area. Where that is too
+    /// large for single precision, infinity.
     pub fn error(&self, d: Vec3) -> f32 {
         let sum = d.dot(self.times(d) + 2.0 * self.b) + self.c;
+        if sum.is_nan() {
+            return f32::INFINITY;
+        }
         // Rounding can leave a sum of squares a little below zero.
         if self.area > 0.0 { sum.max(0.0) / self.area } else { sum.max(0.0) }
     }

@@ -15,22 +15,30 @@
 
 use std::ops::Range;
 
+use glam::Vec3;
 use vertex_tree::NONE;
 
 use super::candidates::{Candidates, State};
 use super::key_counts::KeyCounts;
-use super::legality::is_legal;
+use super::legality::obstacle;
 use super::marks::Marks;
 use super::nodes::{Nodes, round_up};
 use super::order::{self, PIECES};
+use super::remains::Remains;
 use super::samples::Samples;
+use super::stall::Stall;
 use super::surface::{Spoke, Surface};
 
 /// How a measured distance counts against keys that are not measured: with this times its square. Keys are mean squared
 /// distances, less than the square of the largest. With 1, only the worst surprises are put off, at the cost of 7 %
 /// more measurements, and cuts of scans have 15 % fewer triangles than without measuring first; with 2 it is 50 % and
 /// 25 %, with 4 150 % and 26 %.
-const MEASURED_WEIGHT: f32 = 2.0;
+const MEASURED_WEIGHT: f64 = 2.0;
+
+/// Triangles that stand in at most where nothing takes the place of a star, and how many on either side of the star's own
+/// place in the order of a hub's triangles.
+const MOST_OTHERS: usize = 256;
+const BESIDE: usize = 4;
 
 /// Everything that changes while a mesh is being simplified.
 #[derive(Debug)]
@@ -52,17 +60,21 @@ pub(super) struct Builder {
     others: Vec<u32>,
     /// Whether to join components.
     merge: bool,
+    /// Whether a candidate that comes up in vain is given up.
+    pub gives_up: bool,
+    /// Whether triangles may turn by nearly a right angle, as there is no other way left.
+    pub leans: bool,
     /// Length of a unit of the simplification in object units.
-    scale: f64,
+    unit: f64,
 }
 
 impl Builder {
-    pub fn new(surface: Surface, nodes: Nodes, marks: Marks, merge: bool, scale: f64) -> Builder {
+    pub fn new(surface: Surface, nodes: Nodes, marks: Marks, merge: bool, unit: f64) -> Builder {
         let (points, count) = (surface.positions.len(), surface.merged_into.len());
         Builder {
             surface,
             nodes,
-            candidates: Candidates::new(count),
+            candidates: Candidates::new(count, unit),
             samples: Samples::new(points),
             marks,
             touched: None,
@@ -71,7 +83,9 @@ impl Builder {
             bereaved: Vec::new(),
             others: Vec::new(),
             merge,
-            scale,
+            gives_up: false,
+            leans: false,
+            unit,
         }
     }
 
@@ -85,17 +99,25 @@ impl Builder {
 
     /// Collapses until nothing legal is left. At the start `all` vertices had a triangle; numbers are below `numbers`, and
     /// `number` says which one each vertex has. `after_round` is called with the nodes of each round and the key up to
-    /// which candidates were taken up.
+    /// which candidates were taken up. Returns the number of rounds, with those without a collapse; `stall` is what is known
+    /// of rounds before.
+    ///
+    /// This ends. A round with a collapse leaves a vertex less. Of the rounds between two collapses, at most
+    /// [`MOST_IDLE`](super::stall::MOST_IDLE) go by until each gives up the candidates that come up in vain, one at least,
+    /// as the limit is the key of one; a candidate that is given up is no candidate any more until the next collapse or until
+    /// the hopeless are looked at again, which happens once; the reach is doubled up to a limit; and triangles are allowed to
+    /// turn further once.
     pub fn run<E>(
         &mut self,
+        mut stall: Stall,
         all: usize,
         numbers: u32,
         number: impl Fn(u32) -> u32,
         mut after_round: impl FnMut(&Builder, Range<u32>, f32) -> Result<(), E>,
-    ) -> Result<(), E> {
+    ) -> Result<usize, E> {
         // How many vertices there were when virtual edges were last sought, and how far beyond their usual distance.
         let (mut sought_among, mut reach) = (usize::MAX, 1.0);
-        let mut hopeless_retried = false;
+        let mut rounds = 0;
         loop {
             if self.merge && self.surface.live.len() <= sought_among / 2 {
                 sought_among = self.surface.live.len();
@@ -103,22 +125,36 @@ impl Builder {
             }
             if let Some(limit) = self.key_limit() {
                 let first = self.nodes.next();
+                self.gives_up = stall.gives_up();
+                self.candidates.changed = false;
                 self.run_round(limit, all, numbers, &number);
-                if self.nodes.next() > first {
+                rounds += 1;
+                let collapses = self.nodes.next() - first;
+                stall.end_round(collapses as usize, self.candidates.changed);
+                if collapses > 0 {
                     self.surface.rebuild_stars();
                     after_round(self, first..self.nodes.next(), limit)?;
-                    hopeless_retried = false;
                 }
-            } else if !hopeless_retried {
-                hopeless_retried = true;
+            } else if stall.takes_hopeless() {
                 self.retry_hopeless(0..self.surface.live.len());
             } else if self.merge && reach < FARTHEST_REACH {
                 reach *= 2.0;
                 self.seek_virtual_edges(reach, 0..self.surface.live.len());
+            } else if !self.leans {
+                self.leans = true;
+                self.retry_hopeless(0..self.surface.live.len());
             } else {
-                return Ok(());
+                return Ok(rounds);
             }
         }
+    }
+
+    /// Why what is left is left.
+    pub fn remains(&mut self) -> Remains {
+        let mut remains = Remains::default();
+        remains.look_at(0..self.surface.live.len(), &self.surface, &mut self.marks);
+        remains.count_components(&self.surface);
+        remains
     }
 
     /// A round; see [`run`](Self::run). Stars have to be rebuilt afterwards if there are new nodes.
@@ -169,7 +205,12 @@ impl Builder {
         }
         self.order.sort_unstable();
         for i in 0..self.order.len() {
-            self.attempt(self.order[i] as u32, first, limit);
+            let v = self.order[i] as u32;
+            let made = self.nodes.next();
+            self.attempt(v, first, limit);
+            if self.gives_up && self.nodes.next() == made {
+                self.candidates.give_up(v);
+            }
         }
     }
 
@@ -194,13 +235,13 @@ impl Builder {
     fn find_legal(&mut self, v: u32) {
         self.star.clear();
         self.star.extend(self.surface.spokes(v));
-        let star = &self.star;
+        let (star, leans) = (&self.star, self.leans);
         self.candidates.refresh_legal(
             v,
             &mut self.surface,
             &mut self.marks,
             self.merge,
-            |u, surface, marks| is_legal(v, u, star, surface, marks),
+            |u, surface, marks| obstacle(v, u, star, leans, surface, marks).is_none(),
         );
     }
 
@@ -212,69 +253,90 @@ impl Builder {
             return;
         }
         let u = self.candidates.target[v as usize];
-        if self.surface.merged_into[u as usize] != NONE
-            || self.nodes.is_from(self.nodes.top[u as usize], first)
-        {
-            return;
-        }
         self.star.clear();
         self.star.extend(self.surface.spokes(v));
+        let joined = self.star.iter().any(|s| s.touches(u));
+        if !joined && !self.surface.virtual_edges.partners(v).any(|w| w == u) {
+            // The edge has gone with its last triangle.
+            self.candidates.forget(v);
+            return;
+        }
+        if self.nodes.is_from(self.nodes.top[u as usize], first) && !self.may_follow(u) {
+            return;
+        }
         if state == State::Forced {
             // Something must remain to be seen.
             if self.star.iter().all(|s| s.touches(u)) && self.star.len() == self.surface.live_triangles {
-                self.candidates.state[v as usize] = State::Nothing;
+                self.candidates.give_up(v);
                 return;
             }
-        } else if !is_legal(v, u, &self.star, &self.surface, &mut self.marks) {
+        } else if obstacle(v, u, &self.star, self.leans, &self.surface, &mut self.marks).is_some() {
             self.find_legal(v);
             return;
         }
         self.find_bereaved(u);
-        if self.bereaved.iter().any(|&w| self.nodes.is_from(self.nodes.trace[w as usize], first)) {
+        let changed = |w: &u32| self.nodes.is_from(self.nodes.trace[*w as usize], first);
+        if self.bereaved.iter().any(|w| changed(w) && !self.may_follow(*w)) {
             return;
         }
         let error = self.measure(v, u);
         if !self.star.is_empty() && self.samples.nothing_new() {
             // Where components are joined, the last triangles of one could go, with nothing near to take their place.
-            self.candidates.state[v as usize] = State::Nothing;
+            self.candidates.give_up(v);
             return;
         }
-        let key = (MEASURED_WEIGHT * error * error).min(f32::MAX).max(self.candidates.key[v as usize]);
+        let of_unit = error / self.unit;
+        let key = (MEASURED_WEIGHT * of_unit * of_unit).min(f64::from(f32::MAX)) as f32;
+        let key = key.max(self.candidates.key[v as usize]);
+        self.candidates.changed |= key != self.candidates.key[v as usize];
         self.candidates.key[v as usize] = key;
         if key > limit {
             if state == State::Cheapest {
                 self.candidates.state[v as usize] = State::Legal;
+                self.candidates.changed = true;
             }
             return;
         }
-        self.collapse(v, u, error);
+        self.collapse(v, u, error, first);
+    }
+
+    /// Whether another collapse may change the star of `v` in a round in which one has: where `v` is a hub that has only lost
+    /// triangles. Else thousands of triangles at one vertex would take as many rounds. What its star names is still there,
+    /// or known to have vanished.
+    fn may_follow(&self, v: u32) -> bool {
+        self.surface.is_hub(v) && !self.surface.gained[v as usize]
     }
 
     /// Finds the corners of triangles of `self.star` that vanish at the merge into `u` which are in none that remains.
     fn find_bereaved(&mut self, u: u32) {
         self.bereaved.clear();
+        self.marks.clear();
+        for w in self.star.iter().filter(|s| !s.touches(u)).flat_map(|s| [s.next, s.last]) {
+            self.marks.set(w, 0);
+        }
         for s in self.star.iter().filter(|s| s.touches(u)) {
             let apex = if s.next == u { s.last } else { s.next };
-            if !self.star.iter().any(|s| s.touches(apex) && !s.touches(u)) {
+            if self.marks.get(apex).is_none() {
                 self.bereaved.push(apex);
             }
         }
     }
 
-    /// Merges `v`, whose star is in `self.star`, into `u`, which has just been measured.
-    fn collapse(&mut self, v: u32, u: u32, error: f32) {
+    /// Merges `v`, whose star is in `self.star`, into `u`, which has just been measured. The round's first node is given.
+    fn collapse(&mut self, v: u32, u: u32, error: f64, first: u32) {
         let surface = &mut self.surface;
         let (from, to) = (surface.position(v), surface.position(u));
         let node = self.nodes.next();
         let creators = self.star.iter().map(|s| surface.triangles[s.triangle as usize].creator);
         let key = self.candidates.key[v as usize];
-        let positions = [from, to].map(|p| p.as_dvec3() * self.scale);
-        let eps = round_up(f64::from(error) * self.scale);
-        if !self.nodes.add([v, u], positions, creators, &self.bereaved, eps, key) {
-            self.candidates.state[v as usize] = State::Nothing;
+        let positions = [from, to].map(|p| p.as_dvec3());
+        let eps = round_up(error);
+        if !self.nodes.add([v, u], positions, creators, &self.bereaved, eps, key, first) {
+            self.candidates.give_up(v);
             return;
         }
 
+        surface.gained[u as usize] |= self.star.iter().any(|s| !s.touches(u));
         let joined = self.star.iter().any(|s| s.touches(u));
         // Where all is regular, a legal collapse keeps it so.
         let regular =
@@ -293,7 +355,10 @@ impl Builder {
             if spoke.touches(u) {
                 triangle.corners[0] = NONE;
                 surface.live_triangles -= 1;
+                surface.lose(spoke.next);
+                surface.lose(spoke.last);
             } else {
+                surface.degree[u as usize] += 1;
                 triangle.creator = node;
                 triangle.corners = [u, spoke.next, spoke.last];
             }
@@ -311,17 +376,22 @@ impl Builder {
         surface.merged_into[v as usize] = u;
         self.samples.finish(|t, list| surface.triangles[t as usize].samples = list);
         let carried = surface.quadrics[v as usize];
-        surface.quadrics[u as usize].absorb(&carried, to - from);
+        surface.quadrics[u as usize].absorb(&carried, (to - from) * (1.0 / self.unit) as f32);
     }
 
-    /// Measures how far what is shown moves from the input when `v`, whose star is in `self.star`, merges into `u`.
-    fn measure(&mut self, v: u32, u: u32) -> f32 {
+    /// Measures how far what is shown moves from the input when `v`, whose star is in `self.star`, merges into `u`: in object
+    /// units.
+    fn measure(&mut self, v: u32, u: u32) -> f64 {
         let (surface, samples) = (&self.surface, &mut self.samples);
-        samples.begin();
         // A vertex that has lost its triangles shows nothing; when it lost them, that was measured.
         if self.star.is_empty() {
+            samples.begin(surface.position(v), 0.0);
             return 0.0;
         }
+        let corners = self.star.iter().flat_map(|s| [s.next, s.last]).chain([u]);
+        let reach =
+            corners.fold(Vec3::ZERO, |reach, w| reach.max((surface.position(w) - surface.position(v)).abs()));
+        samples.begin(surface.position(v), reach.max_element());
         let (from, to) = (surface.position(v), surface.position(u));
         let with = |a, s: &Spoke| [a, surface.position(s.next), surface.position(s.last)];
         for s in &self.star {
@@ -335,11 +405,19 @@ impl Builder {
         if samples.nothing_new() {
             let joined = [u].into_iter().chain(surface.virtual_edges.partners(v));
             for w in joined.chain(surface.virtual_edges.partners(u)).filter(|&w| w != v) {
-                for s in surface.spokes(w).filter(|s| !s.touches(v)) {
-                    if !self.others.contains(&s.triangle) {
+                let mut add = |s: Spoke| {
+                    if self.others.len() < MOST_OTHERS && !s.touches(v) && !self.others.contains(&s.triangle)
+                    {
                         self.others.push(s.triangle);
                         samples.add_new(s.triangle, with(surface.position(w), &s));
                     }
+                };
+                match self.star.first() {
+                    // Of a hub only what is beside: the distance to these is no less than that to all.
+                    Some(own) if surface.is_hub(w) => {
+                        surface.spokes_beside(w, own.triangle, BESIDE).into_iter().for_each(&mut add);
+                    }
+                    _ => surface.spokes(w).for_each(&mut add),
                 }
             }
         }
@@ -347,7 +425,7 @@ impl Builder {
             add_special_edges(u, &self.star, surface, samples, &mut self.marks);
         }
         samples.prepare();
-        samples.place(v, &surface.positions, &surface.special, to);
+        samples.place(v, &surface.positions, &surface.special, to, None);
         if self.star.iter().all(|s| s.touches(u)) {
             for w in self.star.iter().flat_map(|s| [s.next, s.last]) {
                 if surface.spokes(w).all(|s| s.touches(v)) {
@@ -355,17 +433,23 @@ impl Builder {
                 }
             }
         }
-        for t in self.star.iter().map(|s| &s.triangle).chain(&self.others) {
-            let list = surface.triangles[*t as usize].samples;
-            samples.place_list(list, &surface.positions, &surface.special, to);
+        let mut place_list = |t: u32, beside: usize| {
+            let list = surface.triangles[t as usize].samples;
+            samples.place_list(list, &surface.positions, &surface.special, to, beside);
+        };
+        let mut remaining = 0;
+        for s in &self.star {
+            place_list(s.triangle, remaining);
+            remaining += usize::from(!s.touches(u));
         }
-        for s in self.star.iter().filter(|s| !s.touches(u)) {
+        self.others.iter().for_each(|&t| place_list(t, 0));
+        for (i, s) in self.star.iter().enumerate().filter(|(_, s)| !s.touches(u)) {
             // The triangle's other edge from `u` is the next one's, or was there before.
             let [_, next, last] = with(to, s);
-            samples.measure_reverse((to + next) * 0.5);
+            samples.measure_reverse(&[to, next], i);
             if self.merge {
                 // Joined walls can close a yard whose rim they do not leave.
-                samples.measure_reverse((to + next + last) / 3.0);
+                samples.measure_reverse(&[to, next, last], i);
             }
         }
         samples.error()
@@ -411,8 +495,9 @@ fn add_special_edges(u: u32, star: &[Spoke], surface: &Surface, samples: &mut Sa
             samples.add_special_edge(face, [to, surface.position(w)]);
         }
         if surface.special[s.next as usize] && surface.special[s.last as usize] {
-            let triangles = surface.spokes(s.next).filter(|t| t.touches(s.last)).count();
-            if triangles != 2 {
+            // Whether there are two is told sooner from the star of one that is no hub.
+            let (a, b) = if surface.is_hub(s.next) { (s.last, s.next) } else { (s.next, s.last) };
+            if surface.spokes(a).filter(|t| t.touches(b)).take(3).count() != 2 {
                 samples.add_special_edge(face, [s.next, s.last].map(|w| surface.position(w)));
             }
         }

@@ -14,6 +14,9 @@
 //! A vertex that was removed from a boundary, or from another edge that does not join exactly two triangles, must
 //! stay close to such an edge, and not to just any triangle: a filled bay is an error although nothing is far from the
 //! surface. Such points are measured against the edges when one of them changes.
+//!
+//! All this is done about the removed vertex, in units of its star: so single precision is enough wherever the mesh lies
+//! and however small or large the star is.
 
 use glam::Vec3;
 use vertex_tree::NONE;
@@ -23,6 +26,10 @@ use super::faces::{Faces, segment_distance_squared};
 /// Sample points that a triangle keeps at most. With more, half of the places go to those with the largest distances,
 /// the others to an even selection of the rest.
 const MOST_POINTS: usize = 12;
+
+/// Of more special edges than this, so many on either side of a point's own triangle are looked at.
+const MANY: usize = 128;
+const BESIDE: usize = 16;
 
 /// A sample point, the face that it is nearest to, and the squared distance.
 #[derive(Clone, Copy, Debug)]
@@ -46,6 +53,9 @@ pub(super) struct Samples {
     pub next: Vec<u32>,
     /// For each point, its number in the whole construction, where only some are here, in any order.
     pub ids: Option<Vec<u32>>,
+    /// The removed vertex, and the length that is taken for one: a power of two.
+    center: Vec3,
+    length: f32,
     /// What is there before and after the collapse.
     old: Faces,
     new: Faces,
@@ -63,6 +73,8 @@ impl Samples {
         Samples {
             next: vec![NONE; count],
             ids: None,
+            center: Vec3::ZERO,
+            length: 1.0,
             old: Faces::default(),
             new: Faces::default(),
             triangles: Vec::new(),
@@ -73,8 +85,13 @@ impl Samples {
         }
     }
 
-    /// Starts measuring a collapse.
-    pub fn begin(&mut self) {
+    /// Starts measuring a collapse that removes the vertex at `center`, from which no corner of its star is farther than
+    /// `reach` along any axis.
+    pub fn begin(&mut self, center: Vec3, reach: f32) {
+        self.center = center;
+        // Only the exponent; its reciprocal must be a single-precision number too.
+        let exponent = (reach.to_bits() >> 23).clamp(8, 246);
+        self.length = f32::from_bits(exponent << 23);
         self.old.clear();
         self.new.clear();
         self.triangles.clear();
@@ -83,15 +100,20 @@ impl Samples {
         self.worst = 0.0;
     }
 
+    /// A point of object space about the removed vertex, in units of its star.
+    fn local(&self, p: Vec3) -> Vec3 {
+        (p - self.center) * (1.0 / self.length)
+    }
+
     /// Adds a triangle that the collapse changes.
     pub fn add_old(&mut self, corners: [Vec3; 3]) {
-        self.old.push(corners);
+        self.old.push(corners.map(|p| self.local(p)));
     }
 
     /// Adds a triangle that there is after the collapse.
     pub fn add_new(&mut self, triangle: u32, corners: [Vec3; 3]) {
         self.triangles.push(triangle);
-        self.new.push(corners);
+        self.new.push(corners.map(|p| self.local(p)));
     }
 
     /// Whether there is no triangle after the collapse.
@@ -101,7 +123,7 @@ impl Samples {
 
     /// Adds a special edge that there is after the collapse; it belongs to the new triangle of the given number.
     pub fn add_special_edge(&mut self, face: u32, ends: [Vec3; 2]) {
-        self.edges.push(SpecialEdge { face, ends });
+        self.edges.push(SpecialEdge { face, ends: ends.map(|p| self.local(p)) });
     }
 
     /// To be called between the adding and the placing.
@@ -110,46 +132,77 @@ impl Samples {
         self.new.prepare();
     }
 
-    /// Places a list of sample points. `special` says for each vertex whether it is held to the special edges.
-    pub fn place_list(&mut self, mut point: u32, positions: &[Vec3], special: &[bool], kept: Vec3) {
+    /// Places a list of sample points. `special` says for each vertex whether it is held to the special edges, `beside` beside
+    /// which of the new triangles their own was.
+    pub fn place_list(
+        &mut self,
+        mut point: u32,
+        positions: &[Vec3],
+        special: &[bool],
+        kept: Vec3,
+        beside: usize,
+    ) {
         while point != NONE {
-            self.place(point, positions, special, kept);
+            self.place(point, positions, special, kept, Some(beside));
             point = self.next[point as usize];
         }
     }
 
     /// Places one point. What remains where there is no triangle is the point `kept`.
-    pub fn place(&mut self, point: u32, positions: &[Vec3], special: &[bool], kept: Vec3) {
-        let p = positions[point as usize];
+    pub fn place(
+        &mut self,
+        point: u32,
+        positions: &[Vec3],
+        special: &[bool],
+        kept: Vec3,
+        beside: Option<usize>,
+    ) {
+        let p = self.local(positions[point as usize]);
         let (face, distance_squared) = if self.nothing_new() {
-            (NONE, p.distance_squared(kept))
+            (NONE, p.distance_squared(self.local(kept)))
         } else if !self.edges.is_empty() && special[point as usize] {
-            self.edges.iter().fold((NONE, f32::INFINITY), |nearest, edge| {
+            self.edges_beside(beside).iter().fold((NONE, f32::INFINITY), |nearest, edge| {
                 let distance_squared = segment_distance_squared(p, edge.ends[0], edge.ends[1]);
                 if distance_squared < nearest.1 { (edge.face, distance_squared) } else { nearest }
             })
         } else {
-            self.new.nearest(p)
+            self.new.nearest(p, beside)
         };
         self.worst = self.worst.max(distance_squared);
         self.placed.push(Placed { face, distance_squared, point });
     }
 
+    /// The special edges; of many, those of the new triangles near the one with number `beside`, if that is given.
+    fn edges_beside(&self, beside: Option<usize>) -> &[SpecialEdge] {
+        match beside {
+            Some(beside) if self.edges.len() > MANY => {
+                let middle = self.edges.partition_point(|edge| (edge.face as usize) < beside);
+                let end = (middle + BESIDE).min(self.edges.len());
+                &self.edges[middle.saturating_sub(BESIDE).min(end - BESIDE)..end]
+            }
+            _ => &self.edges,
+        }
+    }
+
     /// Measures a vertex that is left without triangles.
     pub fn measure_lost(&mut self, p: Vec3, kept: Vec3) {
+        let [p, kept] = [p, kept].map(|p| self.local(p));
         let distance_squared =
-            if self.nothing_new() { p.distance_squared(kept) } else { self.new.nearest(p).1 };
+            if self.nothing_new() { p.distance_squared(kept) } else { self.new.nearest(p, None).1 };
         self.worst = self.worst.max(distance_squared);
     }
 
-    /// Measures a point of the new triangles against the old ones.
-    pub fn measure_reverse(&mut self, p: Vec3) {
-        self.worst = self.worst.max(self.old.distance_squared(p, self.worst));
+    /// Measures the middle of some corners of the new triangles against the old ones, the first of them those near the one
+    /// with number `beside`.
+    pub fn measure_reverse(&mut self, corners: &[Vec3], beside: usize) {
+        let sum: Vec3 = corners.iter().map(|&p| self.local(p)).sum();
+        let p = sum * (1.0 / corners.len() as f32);
+        self.worst = self.worst.max(self.old.distance_squared(p, self.worst, beside));
     }
 
-    /// The largest distance so far.
-    pub fn error(&self) -> f32 {
-        self.worst.sqrt()
+    /// The largest distance so far, in object units.
+    pub fn error(&self) -> f64 {
+        f64::from(self.worst).sqrt() * f64::from(self.length)
     }
 
     /// Hands the points to their triangles. `set_list` is called once for every new triangle.

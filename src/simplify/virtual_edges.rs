@@ -4,6 +4,8 @@
 //! blocks would else end in thousands of roots. Pairs are sought in a uniform grid, again and again as vertices grow
 //! fewer and farther apart, with cells that grow with them.
 
+use std::cmp::Ordering;
+
 use glam::Vec3;
 use vertex_tree::NONE;
 
@@ -71,56 +73,57 @@ impl VirtualEdges {
 
     /// Adds pairs among `vertices` that are at most as far apart as neighbouring cells of size `cell` allow.
     pub fn search(&mut self, surface: &Surface, vertices: &[u32], cell: f32) {
-        let component = components(surface);
+        let component = surface.components();
         let grid = Grid::new(&surface.positions, vertices, cell);
         for &v in vertices {
-            let mut nearest: Vec<(f32, u32)> = Vec::with_capacity(PARTNERS + 1);
-            grid.for_each_near(surface.position(v), |w| {
+            let mut nearest: Vec<Partner> = Vec::with_capacity(PARTNERS + 1);
+            grid.for_each_near(surface.position(v), v, |w| {
                 if component[w as usize] == component[v as usize] {
                     return;
                 }
-                let distance = surface.position(v).distance_squared(surface.position(w));
-                if nearest.len() == PARTNERS && nearest[PARTNERS - 1] <= (distance, w) {
+                let partner = Partner {
+                    distance: surface.position(v).distance_squared(surface.position(w)),
+                    apart: w.abs_diff(v),
+                    vertex: w,
+                };
+                if nearest.len() == PARTNERS && !partner.is_nearer(&nearest[PARTNERS - 1]) {
                     return;
                 }
                 // One partner for each component: the nearest.
-                if let Some(other) =
-                    nearest.iter_mut().find(|n| component[n.1 as usize] == component[w as usize])
-                {
-                    if (distance, w) < *other {
-                        *other = (distance, w);
-                    }
-                } else {
-                    nearest.push((distance, w));
+                let same = |n: &&mut Partner| component[n.vertex as usize] == component[w as usize];
+                match nearest.iter_mut().find(same) {
+                    Some(other) if partner.is_nearer(other) => *other = partner,
+                    Some(_) => {}
+                    None => nearest.push(partner),
                 }
-                nearest.sort_unstable_by(|a, b| a.0.total_cmp(&b.0).then(a.1.cmp(&b.1)));
+                nearest.sort_unstable_by(Partner::order);
                 nearest.truncate(PARTNERS);
             });
-            self.pairs.extend(nearest.into_iter().map(|(_, w)| [v, w]));
+            self.pairs.extend(nearest.into_iter().map(|n| [v, n.vertex]));
         }
         self.index(surface.positions.len());
     }
 }
 
-/// For each vertex, a vertex that stands for the component in which triangles join it with others.
-fn components(surface: &Surface) -> Vec<u32> {
-    let mut leader: Vec<u32> = (0..surface.positions.len() as u32).collect();
-    fn find(leader: &mut [u32], mut v: u32) -> u32 {
-        while leader[v as usize] != v {
-            // Path halving keeps the chains short.
-            leader[v as usize] = leader[leader[v as usize] as usize];
-            v = leader[v as usize];
-        }
-        v
+/// A vertex that may be paired with another.
+struct Partner {
+    /// Squared.
+    distance: f32,
+    /// The difference of their numbers. Of thousands at one place, all would else be paired with the first, and only one of
+    /// them could merge with it in a round.
+    apart: u32,
+    vertex: u32,
+}
+
+impl Partner {
+    fn order(&self, other: &Self) -> Ordering {
+        let by_distance = self.distance.total_cmp(&other.distance);
+        by_distance.then(self.apart.cmp(&other.apart)).then(self.vertex.cmp(&other.vertex))
     }
-    for t in &surface.triangles {
-        let a = find(&mut leader, t.corners[0]);
-        for corner in &t.corners[1..] {
-            let b = find(&mut leader, *corner);
-            leader[b as usize] = a;
-        }
+
+    fn is_nearer(&self, other: &Self) -> bool {
+        self.order(other) == Ordering::Less
     }
-    (0..leader.len() as u32).map(|v| find(&mut leader, v)).collect()
 }
 
 /// Vertices sorted by the cell of a uniform grid in which they lie.
@@ -147,15 +150,23 @@ impl Grid {
         ((p - self.low) / self.cell).to_array().map(|x| (x.min(1e9) as u32) + 1)
     }
 
-    fn for_each_near(&self, p: Vec3, mut visit: impl FnMut(u32)) {
-        let [x, y, z] = self.cell_of(p);
+    /// Visits vertices in the cell of `v`, which is at `p`, and in the cells around it: of crowded ones not all.
+    fn for_each_near(&self, p: Vec3, v: u32, mut visit: impl FnMut(u32)) {
+        const MOST: usize = 3 * MOST_IN_CELL;
+        let own = self.cell_of(p);
+        let [x, y, z] = own;
         for x in x - 1..=x + 1 {
             for y in y - 1..=y + 1 {
                 // Three cells in a row of the sorted list.
                 let (first, end) = ([x, y, z - 1], [x, y, z + 1]);
-                let from = self.entries.partition_point(|entry| entry.0 < first);
+                let mut from = self.entries.partition_point(|entry| entry.0 < first);
+                if [x, y] == own[..2] && self.entries.get(from + MOST).is_some_and(|entry| entry.0 <= end) {
+                    // Those whose numbers are close to that of `v`.
+                    let place = self.entries.partition_point(|&entry| entry < (own, v));
+                    from = from.max(place.saturating_sub(MOST / 2));
+                }
                 let near = self.entries[from..].iter().take_while(|entry| entry.0 <= end);
-                near.take(3 * MOST_IN_CELL).for_each(|entry| visit(entry.1));
+                near.take(MOST).for_each(|entry| visit(entry.1));
             }
         }
     }

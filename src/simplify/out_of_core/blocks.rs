@@ -7,7 +7,7 @@
 //! ```text
 //! vertices   22 words: number, input number, position 3, quadric 11, key, target, flags, top, trace, leaf radius
 //! triangles   6 words: number, corners 3, creator, number of sample points
-//! nodes       8 words: number, centre 3, radius, error, dependency depth, height
+//! nodes       9 words: number, centre 3, radius, error, dependency depth, height, key
 //! points      5 words: number, whether special, position 3; those of the first triangle first
 //! ```
 //!
@@ -21,7 +21,7 @@ use super::super::order::SPAN;
 
 pub(super) const VERTEX_WORDS: usize = 22;
 pub(super) const TRIANGLE_WORDS: usize = 6;
-pub(super) const NODE_WORDS: usize = 8;
+pub(super) const NODE_WORDS: usize = 9;
 pub(super) const POINT_WORDS: usize = 5;
 
 /// How many there are of everything.

@@ -125,7 +125,7 @@ impl Parts {
             let float = |i: usize| f32::from_bits(words[i]);
             let bounds = Bounds { center: [float(1), float(2), float(3)], radius: float(4), eps: float(5) };
             nodes.collapses.push(Collapse { removed: NONE, kept: NONE, bounds });
-            nodes.keys.push(0.0);
+            nodes.keys.push(float(8));
             nodes.depth.push(words[6]);
             nodes.height.push(words[7]);
             if let Some(ids) = &mut nodes.ids {

@@ -16,12 +16,12 @@ use vertex_tree::external::Sorter;
 
 use super::super::key_counts::KeyCounts;
 use super::super::order::PIECES;
+use super::super::remains::Remains;
 use super::super::rounds::Builder;
 use super::super::{leaf_radius, set_initial_quadric};
 use super::blocks::Blocks;
 use super::log::Log;
 use super::passes::check;
-use super::prepare::unscaled;
 use super::window::{Ring, Whole, Window};
 
 /// What is done to the vertices of a window.
@@ -33,7 +33,7 @@ pub(super) enum Work {
     Round(f32),
     /// Those without a legal edge are looked at again.
     Retry,
-    /// Nothing is: those into which others have merged are counted.
+    /// Nothing is: those into which others have merged are counted, and what holds them.
     CountRoots,
 }
 
@@ -63,9 +63,12 @@ pub(super) struct Totals<'p> {
     /// Vertices that have been written, and nodes that have been made.
     pub kept: usize,
     pub collapses: usize,
+    /// Whether a key or a state has changed.
+    pub changed: bool,
     /// Triangles that have vanished.
     pub vanished: usize,
     pub roots: usize,
+    pub remains: Remains,
 }
 
 impl Pass<'_> {
@@ -96,7 +99,7 @@ impl Pass<'_> {
         }
         let mut window = Window::load(&self.blocks, list, self.whole, next_id)?;
         window.count(self.totals.lock().counts, false);
-        let roots = self.work_on(&mut window);
+        let (roots, remains) = self.work_on(&mut window);
         let builder = &window.builder;
         let nodes = window.loaded_nodes..builder.nodes.next();
         let (collapses, next_id) = (nodes.len(), builder.nodes.next_id);
@@ -109,7 +112,10 @@ impl Pass<'_> {
         totals.loaded += window.vertices() as u64;
         totals.collapses += collapses;
         totals.vanished += self.whole.live_triangles - builder.surface.live_triangles;
+        totals.changed |= builder.candidates.changed;
         totals.roots += roots;
+        totals.remains.held_by_topology += remains.held_by_topology;
+        totals.remains.held_by_orientation += remains.held_by_orientation;
         window.count(totals.counts, true);
         drop(totals);
         let is_begun = matches!(self.work, Work::Begin);
@@ -122,10 +128,10 @@ impl Pass<'_> {
         Ok(next_id)
     }
 
-    /// Returns the number of roots, if they are counted.
-    fn work_on(&self, window: &mut Window) -> usize {
+    /// Returns the number of roots, and why they are left, if they are counted.
+    fn work_on(&self, window: &mut Window) -> (usize, Remains) {
         let mut neighbours = Vec::new();
-        let mut roots = 0;
+        let (mut roots, mut remains) = (0, Remains::default());
         let pieces: Vec<(u32, Range<usize>)> = window.inner().collect();
         let builder = &mut window.builder;
         for block in pieces.chunk_by(|a, b| a.0 / PIECES == b.0 / PIECES) {
@@ -138,18 +144,28 @@ impl Pass<'_> {
                 Work::Begin => {
                     for v in range {
                         let v = v as u32;
-                        let squared = farthest(builder, v, self.whole.scale);
+                        let squared = farthest(builder, v);
                         builder.nodes.leaf_radius[v as usize] = leaf_radius(squared);
-                        set_initial_quadric(v, &mut builder.surface, &mut builder.marks, &mut neighbours);
+                        let unit = self.whole.unit;
+                        set_initial_quadric(
+                            v,
+                            unit,
+                            &mut builder.surface,
+                            &mut builder.marks,
+                            &mut neighbours,
+                        );
                         builder.candidates.refresh(v, &mut builder.surface, &mut builder.marks);
                     }
                 }
                 Work::Round(limit) => builder.run_block(limit, self.whole.first_id, range),
                 Work::Retry => builder.retry_hopeless(range),
-                Work::CountRoots => roots += range.filter(|&v| builder.nodes.top[v] != NONE).count(),
+                Work::CountRoots => {
+                    remains.look_at(range.clone(), &builder.surface, &mut builder.marks);
+                    roots += range.filter(|&v| builder.nodes.top[v] != NONE).count();
+                }
             }
         }
-        roots
+        (roots, remains)
     }
 }
 
@@ -194,8 +210,8 @@ fn choose(blocks: &Blocks, up: &[u32], bytes: u64, rings: &mut [Ring]) -> (usize
 }
 
 /// The squared distance to the farthest corner of the triangles around `v`, in object units.
-fn farthest(builder: &Builder, v: u32, scale: f64) -> f64 {
-    let position = |v: u32| unscaled(builder.surface.position(v), scale);
+fn farthest(builder: &Builder, v: u32) -> f64 {
+    let position = |v: u32| builder.surface.position(v).as_dvec3();
     let corners = builder.surface.spokes(v).flat_map(|s| [s.next, s.last]);
     corners.fold(0.0, |farthest: f64, w| farthest.max(position(v).distance_squared(position(w))))
 }

@@ -10,6 +10,8 @@ use vertex_tree::external::{Scratch, Sorter};
 use super::super::candidates::Parity;
 use super::super::key_counts::KeyCounts;
 use super::super::order::{self, PARTS, PIECES};
+use super::super::remains::Remains;
+use super::super::stall::Stall;
 use super::blocks::Blocks;
 use super::log::Log;
 use super::pass::{Pass, Totals, Work};
@@ -46,6 +48,10 @@ pub(super) struct Passes<'a> {
     pub loaded: u64,
     /// Vertices left at the end into which others have merged.
     pub roots: usize,
+    /// Why these are left.
+    pub remains: Remains,
+    /// Rounds, with those without a collapse.
+    pub rounds: usize,
 }
 
 impl Passes<'_> {
@@ -56,23 +62,26 @@ impl Passes<'_> {
 
     /// Collapses until nothing legal is left. `progress` is told the number of vertices that are left.
     pub fn run(&mut self, mut progress: impl FnMut(usize)) -> io::Result<()> {
-        let mut hopeless_retried = false;
+        let mut stall = Stall::default();
         while !self.fits() {
             progress(self.live);
             if let Some(limit) = self.counts.limit() {
                 self.blocks.widen(order::span(self.all, self.live));
-                if self.sweep(Work::Round(limit))? > 0 {
-                    hopeless_retried = false;
-                }
+                self.whole.gives_up = stall.gives_up();
+                let (collapses, changed) = self.sweep(Work::Round(limit))?;
+                stall.end_round(collapses, changed);
+                self.rounds += 1;
                 self.whole.parity = self.whole.parity.other();
-            } else if !hopeless_retried {
-                hopeless_retried = true;
+            } else if stall.takes_hopeless() {
+                self.sweep(Work::Retry)?;
+            } else if !self.whole.leans {
+                self.whole.leans = true;
                 self.sweep(Work::Retry)?;
             } else {
                 return self.sweep(Work::CountRoots).map(|_| ());
             }
         }
-        self.finish_in_memory(progress)
+        self.finish_in_memory(stall, progress)
     }
 
     fn fits(&self) -> bool {
@@ -80,7 +89,7 @@ impl Passes<'_> {
     }
 
     /// The rest, once all that is left fits in memory.
-    fn finish_in_memory(&mut self, mut progress: impl FnMut(usize)) -> io::Result<()> {
+    fn finish_in_memory(&mut self, stall: Stall, mut progress: impl FnMut(usize)) -> io::Result<()> {
         let list: Vec<(u32, Ring)> = (0..self.blocks.len() as u32).map(|b| (b, Ring::Inner)).collect();
         self.whole.first_id = self.next_id;
         self.whole.merge = self.merge_components;
@@ -90,7 +99,8 @@ impl Passes<'_> {
         let (all_numbers, numbers) = (self.numbers, window.numbers()[..window.vertices()].to_vec());
         let originals = std::mem::take(&mut window.originals);
         let (log, scratch, stop, sort_bytes) = (&mut self.log, &self.scratch, self.stop, self.sort_bytes);
-        window.builder.run(
+        self.rounds += window.builder.run(
+            stall,
             self.all,
             all_numbers,
             |v| numbers[v as usize],
@@ -102,6 +112,7 @@ impl Passes<'_> {
                 log.end_round(round, limit)
             },
         )?;
+        self.remains = window.builder.remains();
         let (live, top) = (&window.builder.surface.live, &window.builder.nodes.top);
         self.live = live.len();
         self.roots = live.iter().filter(|&&v| top[v as usize] != NONE).count();
@@ -110,8 +121,9 @@ impl Passes<'_> {
         Ok(())
     }
 
-    /// Goes once through the mesh, in the order of a round. Returns the number of collapses.
-    fn sweep(&mut self, work: Work) -> io::Result<usize> {
+    /// Goes once through the mesh, in the order of a round. Returns the number of collapses, and whether any key or state has
+    /// changed.
+    fn sweep(&mut self, work: Work) -> io::Result<(usize, bool)> {
         // Outside of a round, stars are as they are.
         self.whole.first_id = if matches!(work, Work::Round(_)) { self.next_id } else { NONE };
         let (parts, borders) = self.split();
@@ -136,8 +148,10 @@ impl Passes<'_> {
             loaded: 0,
             kept: 0,
             collapses: 0,
+            changed: false,
             vanished: 0,
             roots: 0,
+            remains: Remains::default(),
         };
         let pass = Pass {
             work,
@@ -179,9 +193,12 @@ impl Passes<'_> {
         next_id = pass.run(&borders, next_id, &mut rings, &failed)?;
         let totals = pass.totals.into_inner();
         let (round, kept, collapses) = (totals.round, totals.kept, totals.collapses);
+        let changed = totals.changed;
         self.windows += totals.windows;
         self.loaded += totals.loaded;
         self.roots += totals.roots;
+        self.remains.held_by_topology += totals.remains.held_by_topology;
+        self.remains.held_by_orientation += totals.remains.held_by_orientation;
         self.whole.live_triangles -= totals.vanished;
         self.live -= collapses;
         self.next_id = next_id;
@@ -193,7 +210,7 @@ impl Passes<'_> {
             Work::Round(limit) if collapses > 0 => self.log.end_round(round, limit)?,
             _ => {}
         }
-        Ok(collapses)
+        Ok((collapses, changed))
     }
 
     /// The blocks of each part that are not on borders, and those that are: in pieces, ascending.

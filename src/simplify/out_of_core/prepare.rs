@@ -5,12 +5,13 @@
 
 use std::io;
 
-use glam::{DVec3, Vec3};
+use glam::Vec3;
 use vertex_tree::NONE;
 use vertex_tree::external::{Scratch, Sorter, Spool};
 
+use super::super::edge_lengths::EdgeLengths;
+use super::super::is_flat;
 use super::super::spatial_order::Curve;
-use super::super::{is_flat, power_of_two_above};
 use super::blocks::{Blocks, VERTEX_WORDS, Words};
 
 /// The input on disk, as it will be in the log.
@@ -20,8 +21,8 @@ pub(super) struct Input {
     pub triangles: Spool<3>,
     low: Vec3,
     high: Vec3,
-    /// The largest absolute coordinate.
-    largest: f32,
+    /// Of the edges, once the first blocks have been made.
+    pub lengths: EdgeLengths,
 }
 
 impl Input {
@@ -31,20 +32,14 @@ impl Input {
             triangles: scratch.spool()?,
             low: Vec3::INFINITY,
             high: Vec3::NEG_INFINITY,
-            largest: 0.0,
+            lengths: EdgeLengths::new(),
         })
     }
 
     pub fn push_position(&mut self, position: [f32; 3]) -> io::Result<()> {
         let p = Vec3::from_array(position);
         (self.low, self.high) = (self.low.min(p), self.high.max(p));
-        self.largest = p.abs().max_element().max(self.largest);
         self.positions.push(position.map(f32::to_bits))
-    }
-
-    /// Length of a unit of the simplification in object units.
-    pub fn scale(&self) -> f64 {
-        power_of_two_above(self.largest)
     }
 
     /// Diagonal of the bounding box in object units.
@@ -62,39 +57,39 @@ pub(super) fn first_blocks(
     mut progress: impl FnMut(u64) -> io::Result<()>,
 ) -> io::Result<(Blocks, usize)> {
     let (vertex_count, triangle_count) = (input.positions.len(), input.triangles.len());
-    let scale = input.scale();
-    let scaled = |p: Vec3| (p.as_dvec3() / scale).as_vec3();
-    let curve = Curve::new(scaled(input.low), scaled(input.high));
+    let curve = Curve::new(input.low, input.high);
     let mut share = |part: u64, done: u64, all: u64| {
         if done.is_multiple_of(1 << 16) { progress(part + 250 * done / all.max(1)) } else { Ok(()) }
     };
 
     let mut by_place = Sorter::<5>::new(scratch, memory / 2);
     for (old, position) in (0_u32..).zip(input.positions.read()?) {
-        let p = scaled(Vec3::from_array(position?.map(f32::from_bits)));
-        let [x, y, z] = p.to_array().map(f32::to_bits);
+        let [x, y, z] = position?;
+        let p = Vec3::from_array([x, y, z].map(f32::from_bits));
         by_place.push([curve.key(p), old, x, y, z])?;
         share(0, u64::from(old), vertex_count)?;
     }
     let mut vertices = scratch.spool::<4>()?;
-    let mut by_old = Sorter::<2>::new(scratch, memory / 4);
+    let mut by_old = Sorter::<5>::new(scratch, memory / 4);
     by_place.finish(|[_, old, x, y, z]| {
-        by_old.push([old, vertices.len() as u32])?;
+        by_old.push([old, vertices.len() as u32, x, y, z])?;
         vertices.push([old, x, y, z])?;
         share(250, vertices.len(), vertex_count)
     })?;
-    let mut numbers = scratch.spool::<1>()?;
-    by_old.finish(|[_, new]| numbers.push([new]))?;
+    let mut numbers = scratch.spool::<4>()?;
+    by_old.finish(|[_, new, x, y, z]| numbers.push([new, x, y, z]))?;
     let mut numbers = numbers.into_paged(memory / 4)?;
 
     let mut by_lowest = Sorter::<5>::new(scratch, memory / 2);
     for (number, triangle) in (0_u32..).zip(input.triangles.read()?) {
-        let mut corners = [0; 3];
-        for (corner, old) in corners.iter_mut().zip(triangle?) {
-            [*corner] = numbers.get(u64::from(old))?;
+        let (mut corners, mut places) = ([0; 3], [Vec3::ZERO; 3]);
+        for ((corner, place), old) in corners.iter_mut().zip(&mut places).zip(triangle?) {
+            let [new, x, y, z] = numbers.get(u64::from(old))?;
+            (*corner, *place) = (new, Vec3::from_array([x, y, z].map(f32::from_bits)));
         }
         let [a, b, c] = corners;
         if !is_flat(corners) {
+            input.lengths.add(places);
             by_lowest.push([a.min(b).min(c), number, a, b, c])?;
         }
         share(500, u64::from(number), triangle_count)?;
@@ -138,9 +133,4 @@ pub(super) fn first_blocks(
     }
     blocks.finish_joining();
     Ok((blocks, id as usize))
-}
-
-/// The position of a vertex in object units.
-pub(super) fn unscaled(position: Vec3, scale: f64) -> DVec3 {
-    position.as_dvec3() * scale
 }

@@ -157,7 +157,8 @@ fn put_node(node: u32, nodes: &Nodes, words: &mut Words, marks: &mut Marks) -> u
     let [x, y, z] = bounds.center.map(f32::to_bits);
     let [radius, eps] = [bounds.radius, bounds.eps].map(f32::to_bits);
     let [depth, height] = [nodes.depth[i], nodes.height[i]];
-    words.nodes.extend_from_slice(&[nodes.id(node), x, y, z, radius, eps, depth, height]);
+    let key = nodes.keys[i].to_bits();
+    words.nodes.extend_from_slice(&[nodes.id(node), x, y, z, radius, eps, depth, height, key]);
     place
 }
 

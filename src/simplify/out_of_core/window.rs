@@ -37,12 +37,16 @@ pub(super) enum Ring {
 #[derive(Clone, Debug)]
 pub(super) struct Whole {
     /// Length of a unit of the simplification in object units.
-    pub scale: f64,
+    pub unit: f64,
     /// Diagonal of the bounding box in object units.
     pub extent: f64,
     pub live_triangles: usize,
     /// The number of the first node of the current round.
     pub first_id: u32,
+    /// Whether candidates that come up in vain are given up.
+    pub gives_up: bool,
+    /// Whether triangles may turn by nearly a right angle.
+    pub leans: bool,
     pub parity: Parity,
     pub merge: bool,
 }
@@ -75,7 +79,7 @@ impl Window {
             let blocks = blocks.lock();
             (Parts::new(&blocks, &list), blocks.span())
         };
-        let mut nodes = Nodes::new(Vec::new(), whole.extent);
+        let mut nodes = Nodes::new(Vec::new(), whole.extent, whole.unit);
         (nodes.ids, nodes.next_id) = (Some(Vec::new()), next_id);
         let mut starts = Vec::with_capacity(list.len() + 1);
         let mut words = Vec::new();
@@ -114,7 +118,8 @@ impl Window {
         parts.trace.resize(vertices, NONE);
         (nodes.leaf_radius, nodes.top, nodes.trace) = (parts.leaf_radius, parts.top, parts.trace);
         let loaded_nodes = nodes.next();
-        let mut builder = Builder::new(surface, nodes, Marks::new(vertices), whole.merge, whole.scale);
+        let mut builder = Builder::new(surface, nodes, Marks::new(vertices), whole.merge, whole.unit);
+        (builder.gives_up, builder.leans) = (whole.gives_up, whole.leans);
         builder.touched = Some(Vec::new());
         let candidates = &mut builder.candidates;
         candidates.parity = whole.parity;
@@ -146,7 +151,10 @@ impl Window {
         for v in 0..self.originals.len() as u32 {
             let top = nodes.top[v as usize];
             if nodes.is_from(top, first) {
-                self.builder.surface.hide(v, |t| t.creator == top);
+                let surface = &mut self.builder.surface;
+                let before = surface.star_length(v);
+                surface.hide(v, |t| t.creator == top);
+                surface.gained[v as usize] = surface.star_length(v) < before;
             }
         }
     }
