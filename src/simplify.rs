@@ -21,7 +21,7 @@ use std::ops::Range;
 use std::time::{Duration, Instant};
 
 use glam::{DVec3, Vec3};
-use vertex_tree::{Collapse, CollapseLog, LogError, Mesh};
+use vertex_tree::{Collapse, CollapseLog, Georeference, LogError, Mesh};
 
 use crate::progress::Progress;
 pub use out_of_core::{LEAST_MEMORY, Limits, MOST_THREADS, OutOfCoreError, build_within};
@@ -91,6 +91,8 @@ pub struct Report {
     pub windows: u64,
     /// See [`windows`](Self::windows).
     pub loaded: u64,
+    /// Where the mesh lies in the world.
+    pub georeference: Georeference,
     /// Time to prepare: renumbering, quadrics.
     pub preparation: Duration,
     /// Time of the rounds.
@@ -171,6 +173,7 @@ pub fn build(mesh: Mesh, options: &Options, progress: Progress) -> Result<(Colla
         inversions,
         windows: 0,
         loaded: 0,
+        georeference: log.mesh.georeference.clone(),
         preparation,
         simplification,
         conclusion: start.elapsed(),

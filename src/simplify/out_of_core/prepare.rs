@@ -6,18 +6,26 @@
 use std::io;
 
 use glam::{DVec3, Vec3};
-use vertex_tree::NONE;
 use vertex_tree::external::{Scratch, Sorter, Spool};
+use vertex_tree::{Georeference, NONE, Rounding};
 
 use super::super::spatial_order::Curve;
 use super::super::{is_flat, power_of_two_above};
 use super::blocks::{Blocks, VERTEX_WORDS, Words};
+use crate::mesh_io::{Bounds, EdgeLengths, Placing, exact};
 
 /// The input on disk, as it will be in the log.
 #[derive(Debug)]
 pub(super) struct Input {
+    /// Relative to the origin, once [`place`](Self::place) has been called.
     pub positions: Spool<3>,
     pub triangles: Spool<3>,
+    pub georeference: Georeference,
+    /// All positions in 64 bits, once 32 do not hold one of them exactly; then there are none in `positions`.
+    wide: Option<Spool<6>>,
+    scratch: Scratch,
+    /// Of the world coordinates.
+    bounds: Bounds,
     low: Vec3,
     high: Vec3,
     /// The largest absolute coordinate.
@@ -29,17 +37,85 @@ impl Input {
         Ok(Input {
             positions: scratch.spool()?,
             triangles: scratch.spool()?,
+            georeference: Georeference::default(),
+            wide: None,
+            scratch: scratch.clone(),
+            bounds: Bounds::default(),
             low: Vec3::INFINITY,
             high: Vec3::NEG_INFINITY,
             largest: 0.0,
         })
     }
 
-    pub fn push_position(&mut self, position: [f32; 3]) -> io::Result<()> {
+    /// How many vertices there are.
+    pub fn vertices(&self) -> u64 {
+        self.wide.as_ref().map_or(self.positions.len(), Spool::len)
+    }
+
+    pub fn push_position(&mut self, position: [f64; 3]) -> io::Result<()> {
+        self.bounds.include(position);
+        if self.wide.is_none() {
+            if let Some(short) = exact(position) {
+                return self.push_placed(short);
+            }
+            let mut wide = self.scratch.spool()?;
+            for short in self.positions.read()? {
+                wide.push(to_words(short?.map(|x| f64::from(f32::from_bits(x)))))?;
+            }
+            self.forget_positions()?;
+            self.wide = Some(wide);
+        }
+        match &mut self.wide {
+            Some(wide) => wide.push(to_words(position)),
+            None => Ok(()),
+        }
+    }
+
+    pub fn position_of(&mut self, vertex: u32) -> io::Result<[f64; 3]> {
+        match &mut self.wide {
+            Some(wide) => Ok(from_words(wide.get(u64::from(vertex))?)),
+            None => Ok(self.positions.get(u64::from(vertex))?.map(|x| f64::from(f32::from_bits(x)))),
+        }
+    }
+
+    /// Once everything has been read: makes 32-bit positions about the middle, if 32 bits do not hold the world coordinates, as
+    /// the collector of `mesh_io` does in memory. `memory` is in bytes.
+    pub fn place(&mut self, memory: usize, mut check: impl FnMut() -> io::Result<()>) -> io::Result<()> {
+        let Some(mut wide) = self.wide.take() else { return Ok(()) };
+        let mut placing = Placing::new(&self.bounds);
+        for position in wide.read()? {
+            check()?;
+            self.push_placed(placing.place(from_words(position?)))?;
+        }
+        let mut edges = EdgeLengths::default();
+        if placing.largest_move > 0.0 {
+            let mut wide = wide.into_paged(memory)?;
+            for triangle in self.triangles.read()? {
+                check()?;
+                let mut corners = [[0.0; 3]; 3];
+                for (corner, vertex) in corners.iter_mut().zip(triangle?) {
+                    *corner = from_words(wide.get(u64::from(vertex))?);
+                }
+                edges.add(corners);
+            }
+        }
+        self.georeference.origin = placing.origin;
+        self.georeference.rounding =
+            Rounding { largest_move: placing.largest_move, median_edge: edges.median() };
+        Ok(())
+    }
+
+    fn push_placed(&mut self, position: [f32; 3]) -> io::Result<()> {
         let p = Vec3::from_array(position);
         (self.low, self.high) = (self.low.min(p), self.high.max(p));
         self.largest = p.abs().max_element().max(self.largest);
         self.positions.push(position.map(f32::to_bits))
+    }
+
+    fn forget_positions(&mut self) -> io::Result<()> {
+        self.positions = self.scratch.spool()?;
+        (self.low, self.high, self.largest) = (Vec3::INFINITY, Vec3::NEG_INFINITY, 0.0);
+        Ok(())
     }
 
     /// Length of a unit of the simplification in object units.
@@ -143,4 +219,16 @@ pub(super) fn first_blocks(
 /// The position of a vertex in object units.
 pub(super) fn unscaled(position: Vec3, scale: f64) -> DVec3 {
     position.as_dvec3() * scale
+}
+
+/// Each coordinate in two words, the lower first.
+fn to_words(position: [f64; 3]) -> [u32; 6] {
+    let [x, y, z] = position.map(f64::to_bits);
+    [x as u32, (x >> 32) as u32, y as u32, (y >> 32) as u32, z as u32, (z >> 32) as u32]
+}
+
+fn from_words(words: [u32; 6]) -> [f64; 3] {
+    std::array::from_fn(|axis| {
+        f64::from_bits(u64::from(words[2 * axis + 1]) << 32 | u64::from(words[2 * axis]))
+    })
 }

@@ -5,7 +5,7 @@ use std::io::{Cursor, Write};
 use std::path::{Path, PathBuf};
 
 use foldfront::Mesh;
-use foldfront::mesh_io::{self, HeightScale, MeshIoError, ReadOptions};
+use foldfront::mesh_io::{self, Collector, HeightScale, MeshIoError, ReadOptions};
 use png::{BitDepth, ColorType};
 use proptest::prelude::*;
 use tempfile::TempDir;
@@ -15,10 +15,10 @@ use tiff::tags::Tag;
 /// Reads at once, and piece by piece, which has to come to the same.
 fn read(inputs: &[impl AsRef<Path>]) -> Result<Mesh, MeshIoError> {
     let whole = mesh_io::read(inputs, &mut |_, _| ());
-    let mut pieces = Mesh::default();
+    let mut pieces = Collector::default();
     let folder = std::env::temp_dir();
-    let sent =
-        mesh_io::send(inputs, &ReadOptions::default(), &folder, &mut pieces, &mut |_, _| ()).map(|()| pieces);
+    let sent = mesh_io::send(inputs, &ReadOptions::default(), &folder, &mut pieces, &mut |_, _| ());
+    let sent = sent.map(|()| pieces.into_mesh());
     match (&whole, &sent) {
         (Ok(whole), Ok(pieces)) => assert_eq!(whole, pieces),
         // Of several errors, another may be met first.
