@@ -94,7 +94,7 @@ pub enum MeshIoError {
         format: &'static str,
     },
     /// The file holds more than it announces.
-    #[error("{}: {place}: more than is announced: {found} is left over", file.display())]
+    #[error("{}: {place}: more than is announced: {found}", file.display())]
     LeftOver {
         /// The file.
         file: PathBuf,

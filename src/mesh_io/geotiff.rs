@@ -69,7 +69,7 @@ pub(super) fn locate(tags: &GeoTags, size: [u32; 2]) -> Result<Location, String>
     let middle = tags.middle(size).map(|middle| middle.map(|x| x * unit));
     let latitude = middle.map_or(0.0, |[_, latitude]| latitude);
     let narrowing = latitude.to_radians().cos();
-    if !(latitude.abs() < 90.0) {
+    if latitude.abs() >= 90.0 || latitude.is_nan() {
         return Err(format!("the middle of the map is at a latitude of {latitude} degrees"));
     }
     for step in steps {

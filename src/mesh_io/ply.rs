@@ -31,7 +31,8 @@ pub(super) fn send(
     receiver: &mut dyn Receiver,
     progress: Progress<'_>,
 ) -> Result<Contents, MeshIoError> {
-    let mut reading = Reading { file, receiver, vertices: 0, with_vertices: true, late_faces: false, faces: false };
+    let mut reading =
+        Reading { file, receiver, vertices: 0, with_vertices: true, late_faces: false, faces: false };
     reading.read(&mut *progress)?;
     if reading.late_faces {
         reading.with_vertices = false;
@@ -64,11 +65,8 @@ impl Reading<'_> {
             let is_strips = STRIPS.contains(&&*element.name);
             let is_late = self.with_vertices && last_vertices.is_some_and(|last| number < last);
             // What is late now comes the second time, and what has come already does not.
-            let is_wanted = if self.with_vertices {
-                !is_late
-            } else {
-                last_vertices.is_some_and(|last| number < last)
-            };
+            let is_wanted =
+                if self.with_vertices { !is_late } else { last_vertices.is_some_and(|last| number < last) };
             match element.name.as_str() {
                 "vertex" if self.with_vertices => self.read_vertices(element, &mut body)?,
                 "face" | "tristrips" | "tristrip" if element.count > 0 => {
@@ -88,22 +86,27 @@ impl Reading<'_> {
     }
 
     fn read_vertices(&mut self, element: &ElementDef, body: &mut Body<'_, '_>) -> Result<(), MeshIoError> {
-        let axes: Vec<Option<usize>> =
-            element.properties.iter().map(|p| ["x", "y", "z"].iter().position(|axis| *axis == p.name)).collect();
+        let axes: Vec<Option<usize>> = element
+            .properties
+            .iter()
+            .map(|p| ["x", "y", "z"].iter().position(|axis| *axis == p.name))
+            .collect();
         for (axis, name) in ["x", "y", "z"].into_iter().enumerate() {
             let is_there = element.properties.iter().zip(&axes).any(|(property, found)| {
                 *found == Some(axis) && matches!(property.property_type, PropertyType::Scalar(_))
             });
             if !is_there && element.count > 0 {
-                return Err(body.refuse(Place::Vertex(self.vertices as u64), &format!("missing field `{name}`")));
+                return Err(
+                    body.refuse(Place::Vertex(self.vertices as u64), &format!("missing field `{name}`"))
+                );
             }
         }
         for _ in 0..element.count {
             let place = Place::Vertex(self.vertices as u64);
             let mut position = [0.0; 3];
             for (property, axis) in element.properties.iter().zip(&axes) {
-                match (property.property_type.clone(), axis) {
-                    (PropertyType::Scalar(kind), &Some(axis)) => {
+                match (&property.property_type, axis) {
+                    (&PropertyType::Scalar(kind), &Some(axis)) => {
                         position[axis] = check_coordinate(self.file, place, body.number(kind, place)?)?;
                     }
                     (kind, _) => skip(kind, place, body)?,
@@ -183,8 +186,8 @@ fn for_each_list(
     for row in 0..element.count as u64 {
         let place = Place::Face(row);
         for (number, property) in element.properties.iter().enumerate() {
-            match property.property_type.clone() {
-                PropertyType::List { count_type, data_type } if number == list => {
+            match &property.property_type {
+                &PropertyType::List { count_type, data_type } if number == list => {
                     if is_float(data_type) {
                         return Err(body.refuse(place, "the numbers of vertices are not whole numbers"));
                     }
@@ -205,14 +208,14 @@ fn skip_rows(
 ) -> Result<(), MeshIoError> {
     for row in 0..element.count as u64 {
         for property in &element.properties {
-            skip(property.property_type.clone(), place(row), body)?;
+            skip(&property.property_type, place(row), body)?;
         }
     }
     Ok(())
 }
 
-fn skip(kind: PropertyType, place: Place, body: &mut Body<'_, '_>) -> Result<(), MeshIoError> {
-    match kind {
+fn skip(kind: &PropertyType, place: Place, body: &mut Body<'_, '_>) -> Result<(), MeshIoError> {
+    match *kind {
         PropertyType::Scalar(kind) => body.skip(1, kind, place),
         PropertyType::List { count_type, data_type } => {
             let count = body.count(count_type, place)?;

@@ -23,7 +23,8 @@ pub(super) fn read(mut input: Input<'_>, scale: Option<HeightScale>) -> Result<R
         BitDepth::Sixteen => (2, u16::MAX.into()),
         _ => (1, u8::MAX.into()),
     };
-    let sample = |b: &[u8]| if width == 2 { f32::from(u16::from_be_bytes([b[0], b[1]])) } else { b[0].into() };
+    let sample =
+        |b: &[u8]| if width == 2 { f32::from(u16::from_be_bytes([b[0], b[1]])) } else { b[0].into() };
     let pixels = bytes.chunks_exact(width * channels);
     let heights = pixels.map(|b| if channels == 2 && b[width] == 0 { f32::NAN } else { sample(b) });
     let size = (info.width, info.height);

@@ -90,8 +90,8 @@ fn facets(count: u32, input: &mut Input<'_>) -> Result<(u64, bool), MeshIoError>
     }
     let with_attributes = facets_with_attributes(input).map_err(|e| input.io(Place::Byte(0), e))?;
     match with_attributes {
-        Some(facets) if facets == announced || rest % record != 0 => Ok((facets, true)),
-        _ if rest % record == 0 => Ok((rest / record, false)),
+        Some(facets) if facets == announced || !rest.is_multiple_of(record) => Ok((facets, true)),
+        _ if rest.is_multiple_of(record) => Ok((rest / record, false)),
         _ => {
             let file = input.path.to_owned();
             Err(MeshIoError::FacetCount { file, facets: count, bytes: input.length })

@@ -30,9 +30,9 @@ pub(super) fn read(mut input: Input<'_>, scale: Option<HeightScale>) -> Result<R
         TiffError::IoError(error) => input.io(Place::Byte(input.position), error),
         error => input.decode(error),
     })?;
-    let Image { columns, rows, samples, range, tags } = decoded.map_err(|feature| input.unsupported(feature))?;
-    let location =
-        geotiff::locate(&tags, [columns, rows]).map_err(|feature| input.unsupported(feature))?;
+    let Image { columns, rows, samples, range, tags } =
+        decoded.map_err(|feature| input.unsupported(feature))?;
+    let location = geotiff::locate(&tags, [columns, rows]).map_err(|feature| input.unsupported(feature))?;
     Ok(Raster::new((columns, rows), samples, scale, location, range))
 }
 
@@ -124,7 +124,9 @@ fn apply_mask(
     let colour = file.colortype()?;
     let (ColorType::Gray(bits @ (1 | 8)), true) = (colour, mask_size == size) else {
         let (columns, rows) = mask_size;
-        return Ok(Err(format!("{colour:?} samples in a mask of {columns} x {rows}: a mask has 1 or 8 bits, and its image's size")));
+        return Ok(Err(format!(
+            "{colour:?} samples in a mask of {columns} x {rows}: a mask has 1 or 8 bits, and its image's size"
+        )));
     };
     let mut is_shown = vec![false; samples.len()];
     for_each_chunk(file, |chunk, at| {
@@ -211,10 +213,13 @@ impl Void {
     fn new(text: &str) -> Option<Self> {
         let text = text.trim_matches(|c: char| c == '\0' || c.is_ascii_whitespace());
         let value: f64 = text.parse().ok()?;
-        let mantissa = text.split(['e', 'E']).next().unwrap_or("");
-        let digits = mantissa.trim_start_matches(['-', '+', '0', '.']).bytes().filter(u8::is_ascii_digit).count();
-        let is_shortened = digits >= SHORTENED_DIGITS && text.contains(['.', 'e', 'E']);
-        let slack = if is_shortened { value.abs() * 10_f64.powi(1 - digits.min(17) as i32) } else { 0.0 };
+        let (mantissa, exponent) = text.split_once(['e', 'E']).unwrap_or((text, "0"));
+        let digits = mantissa.bytes().filter(u8::is_ascii_digit).count();
+        let decimals = mantissa.split_once('.').map_or(0, |(_, decimals)| decimals.len());
+        let is_shortened = digits >= SHORTENED_DIGITS && (decimals > 0 || text.len() > mantissa.len());
+        let last_digit = exponent.parse::<i32>().unwrap_or(0).saturating_sub(decimals as i32);
+        // Halves come out a bit wider than they are.
+        let slack = if is_shortened { 0.500_001 * 10_f64.powi(last_digit) } else { 0.0 };
         Some(Self { value, slack })
     }
 

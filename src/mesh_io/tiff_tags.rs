@@ -47,8 +47,9 @@ impl<R: Read + Seek> Blackened<R> {
         if big_file {
             self.number::<4>(big_endian)?;
         }
-        let offset =
-            |file: &mut Self| if big_file { file.number::<8>(big_endian) } else { file.number::<4>(big_endian) };
+        let offset = |file: &mut Self| {
+            if big_file { file.number::<8>(big_endian) } else { file.number::<4>(big_endian) }
+        };
         for number in 0..MOST_DIRECTORIES {
             let at = offset(self)?;
             if at == 0 {
@@ -99,7 +100,9 @@ impl<R: Read> Read for Blackened<R> {
     fn read(&mut self, buffer: &mut [u8]) -> io::Result<usize> {
         let bytes = self.reader.read(buffer)?;
         for &(at, value) in &self.changes {
-            if let Some(byte) = at.checked_sub(self.position).and_then(|i| buffer[..bytes].get_mut(i as usize)) {
+            if let Some(byte) =
+                at.checked_sub(self.position).and_then(|i| buffer[..bytes].get_mut(i as usize))
+            {
                 *byte = value;
             }
         }

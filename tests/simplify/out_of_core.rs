@@ -15,7 +15,10 @@ use crate::{check, difficult, flat_grid, options, simplify};
 const BYTES_A_VERTEX: u64 = 300;
 
 fn send(mesh: &Mesh, receiver: &mut dyn Receiver) -> Result<(), MeshIoError> {
-    mesh.positions.iter().try_for_each(|&p| receiver.position(p.map(f64::from))).map_err(MeshIoError::Receiver)?;
+    mesh.positions
+        .iter()
+        .try_for_each(|&p| receiver.position(p.map(f64::from)))
+        .map_err(MeshIoError::Receiver)?;
     mesh.triangles.iter().try_for_each(|&t| receiver.triangle(t)).map_err(MeshIoError::Receiver)
 }
 
@@ -206,7 +209,7 @@ fn failures_are_named() {
         let read = |receiver: &mut dyn Receiver, _: &mut dyn FnMut(u64, u64)| {
             send(&mesh, receiver)?;
             receiver
-                .position(position)
+                .position(position.map(f64::from))
                 .and_then(|()| receiver.triangle(triangle))
                 .map_err(MeshIoError::Receiver)
         };

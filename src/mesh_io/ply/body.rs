@@ -65,7 +65,9 @@ impl<'i, 'a> Body<'i, 'a> {
                 let number = match kind {
                     ScalarType::F32 => {
                         // Beyond the range of 32 bits, the error shall say what is there.
-                        word.parse().ok().map(|x: f32| if x.is_infinite() { word.parse() } else { Ok(x.into()) })
+                        word.parse()
+                            .ok()
+                            .map(|x: f32| if x.is_infinite() { word.parse() } else { Ok(x.into()) })
                     }
                     _ => Some(word.parse()),
                 };
