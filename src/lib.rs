@@ -69,6 +69,7 @@ pub mod compare;
 pub mod criterion;
 pub mod cut;
 pub mod deviation;
+mod edge_lengths;
 pub mod engine;
 mod filter;
 mod foresight;

@@ -3,13 +3,17 @@
 //! | extension | read are |
 //! |---|---|
 //! | `.obj` | positions and faces of all groups |
-//! | `.ply` | the elements `vertex` and `face`, in text or binary |
+//! | `.ply` | the elements `vertex`, `face` and `tristrips`, in text or binary |
 //! | `.stl` | facets in text or binary, with equal corners joined |
 //! | `.off` | positions and faces, in text |
 //! | `.hgt` | a height tile of 1201 or 3601 samples a side; several are one mosaic |
 //! | `.zip` | the `.hgt` tiles in it |
 //! | `.png` | a grey height map of 8 or 16 bits |
 //! | `.tif`, `.tiff` | a height map of 8 or 16 bits unsigned, 16 bits signed or floating point, also GeoTIFF |
+//!
+//! Coordinates are read in the precision of the file: that of 64 bits in text but for a `float` of PLY, and of the type in binary. If
+//! 32 bits hold all of them, the mesh has them as they are; otherwise its positions are about its middle, which is the origin
+//! of its [`Georeference`](crate::vertex_tree::Georeference).
 //!
 //! Vertices are neither split nor merged (but for STL, which has none), so that their numbers are those of the file,
 //! and unused ones are kept. Polygons are triangulated, whether convex or not. What has no surface is left out: a
@@ -18,27 +22,44 @@
 //! Terrain lies in the xy plane with x to the east, y to the north and z up, its middle at the origin. Where there
 //! are voids, it has holes: triangles with a void corner, and samples that no other triangle uses, are left out.
 //!
+//! Text may begin with the byte order mark of UTF-8, and comments come in any encoding. A file holds what it announces, no less
+//! and no more.
+//!
 //! A file that is damaged, or was made to do harm, gives an error; it never takes more memory than a small multiple
 //! of its (uncompressed) length.
 
+mod collector;
 mod error;
+mod geotiff;
 mod hgt;
 mod input;
 mod obj;
 mod off;
 mod ply;
+mod png_map;
 mod polygon;
 mod raster;
 mod receiver;
+mod rounding;
 mod stl;
+mod stl_text;
 mod terrain;
 mod text;
+mod tiff_map;
+mod tiff_tags;
+mod triangulate;
+mod words;
+mod write_ply;
 
+pub use collector::Collector;
 pub use error::{MeshIoError, Place};
-pub use ply::write_ply;
 pub use receiver::Receiver;
+pub(crate) use rounding::{Bounds, Placing, exact};
+pub use write_ply::write_ply;
 
 use std::path::Path;
+
+use vertex_tree::DegreeMap;
 
 use crate::Mesh;
 use crate::progress::Progress;
@@ -92,31 +113,14 @@ pub fn read_with(
     options: &ReadOptions,
     progress: Progress<'_>,
 ) -> Result<Mesh, MeshIoError> {
-    let inputs = check(inputs)?;
-    let first = inputs[0];
-    let mesh = match &*extension(first) {
-        "hgt" | "zip" => hgt::read(&inputs, progress)?,
-        extension => {
-            let input = Input::open(first, &mut *progress)?;
-            match extension {
-                "obj" => obj::read(input)?,
-                "ply" => ply::read(input)?,
-                "stl" => stl::read(input)?,
-                "off" => off::read(input)?,
-                "png" => terrain::to_mesh(&raster::read_png(input, options.height_scale)?, first, progress)?,
-                _ => terrain::to_mesh(&raster::read_tiff(input, options.height_scale)?, first, progress)?,
-            }
-        }
-    };
-    if mesh.triangles.is_empty() {
-        return Err(MeshIoError::Empty { file: first.to_owned() });
-    }
-    Ok(mesh)
+    let mut collector = Collector::default();
+    deliver(inputs, options, None, &mut collector, progress)?;
+    Ok(collector.into_mesh())
 }
 
-/// Reads as [`read_with`] does, but hands the mesh on piece by piece: `.ply`, `.obj`, `.hgt` and `.zip` take no memory to
-/// speak of, whatever their size; the other formats are in memory until they have been handed on. Temporary files are
-/// made in `folder`.
+/// Reads as [`read_with`] does, but hands the mesh on piece by piece: `.ply`, `.obj`, `.off`, `.hgt` and `.zip` take no memory
+/// to speak of, whatever their size; of `.stl`, the vertices are in memory, and of height maps, the samples. Temporary files
+/// are made in `folder`. A [`Collector`] that takes the mesh comes to what [`read_with`] gives.
 ///
 /// # Errors
 /// As [`read`], and [`MeshIoError::Receiver`].
@@ -127,19 +131,49 @@ pub fn send(
     receiver: &mut dyn Receiver,
     progress: Progress<'_>,
 ) -> Result<(), MeshIoError> {
+    deliver(inputs, options, Some(folder), receiver, progress)
+}
+
+/// What a file is found to hold.
+struct Contents {
+    /// Whether it has faces, or anything else that joins vertices, be it without surface.
+    faces: bool,
+}
+
+/// Hands a mesh on, with temporary files in `folder`, or everything that is needed in memory if there is none.
+fn deliver(
+    inputs: &[impl AsRef<Path>],
+    options: &ReadOptions,
+    folder: Option<&Path>,
+    receiver: &mut dyn Receiver,
+    progress: Progress<'_>,
+) -> Result<(), MeshIoError> {
     let files = check(inputs)?;
-    let mut counting = Counting { receiver, triangles: 0 };
-    match &*extension(files[0]) {
+    let file = files[0];
+    let mut counting = Counting { receiver, vertices: 0, triangles: 0 };
+    let contents = match &*extension(file) {
         "hgt" | "zip" => hgt::send(&files, folder, &mut counting, progress)?,
-        "obj" => obj::send(files[0], &mut counting, progress)?,
-        "ply" => ply::send(files[0], &mut counting, progress)?,
-        _ => {
-            let mesh = read_with(inputs, options, progress)?;
-            mesh.positions.iter().try_for_each(|&p| counting.position(p)).map_err(MeshIoError::Receiver)?;
-            mesh.triangles.iter().try_for_each(|&t| counting.triangle(t)).map_err(MeshIoError::Receiver)?;
+        "obj" if folder.is_none() => obj::read(file, &mut counting, progress)?,
+        "obj" => obj::send(file, &mut counting, progress)?,
+        "ply" => ply::send(file, &mut counting, progress)?,
+        "stl" => stl::send(file, &mut counting, progress)?,
+        "off" => off::send(file, &mut counting, progress)?,
+        extension => {
+            let input = Input::open(file, &mut *progress)?;
+            let raster = match extension {
+                "png" => png_map::read(input, options.height_scale)?,
+                _ => tiff_map::read(input, options.height_scale)?,
+            };
+            raster.send(file, &mut counting, progress)?
         }
+    };
+    match counting {
+        Counting { triangles: 1.., .. } => Ok(()),
+        Counting { vertices: points @ 1.., .. } if !contents.faces => {
+            Err(MeshIoError::PointCloud { file: file.to_owned(), points })
+        }
+        _ => Err(MeshIoError::Empty { file: file.to_owned() }),
     }
-    if counting.triangles == 0 { Err(MeshIoError::Empty { file: files[0].to_owned() }) } else { Ok(()) }
 }
 
 /// About how many triangles there are in files, by their lengths alone; 0 where that says nothing.
@@ -160,14 +194,16 @@ pub fn expected_triangles(files: &[impl AsRef<Path>]) -> u64 {
     files.iter().map(|file| expected(file.as_ref())).sum()
 }
 
-/// Counts the triangles on their way to another receiver.
+/// Counts what is on its way to another receiver.
 struct Counting<'a> {
     receiver: &'a mut dyn Receiver,
+    vertices: u64,
     triangles: u64,
 }
 
 impl Receiver for Counting<'_> {
-    fn position(&mut self, position: [f32; 3]) -> std::io::Result<()> {
+    fn position(&mut self, position: [f64; 3]) -> std::io::Result<()> {
+        self.vertices += 1;
         self.receiver.position(position)
     }
 
@@ -176,8 +212,12 @@ impl Receiver for Counting<'_> {
         self.receiver.triangle(corners)
     }
 
-    fn position_of(&mut self, vertex: u32) -> std::io::Result<[f32; 3]> {
+    fn position_of(&mut self, vertex: u32) -> std::io::Result<[f64; 3]> {
         self.receiver.position_of(vertex)
+    }
+
+    fn georeference(&mut self, coordinate_system: &str, degrees: Option<DegreeMap>) {
+        self.receiver.georeference(coordinate_system, degrees);
     }
 }
 

@@ -2,7 +2,6 @@
 
 mod ball;
 mod candidates;
-mod edge_lengths;
 mod faces;
 mod key_counts;
 mod legality;
@@ -24,13 +23,13 @@ use std::ops::Range;
 use std::time::{Duration, Instant};
 
 use glam::{DVec3, Vec3};
-use vertex_tree::{Collapse, CollapseLog, LogError, Mesh};
+use vertex_tree::{Collapse, CollapseLog, Georeference, LogError, Mesh};
 
 use crate::progress::Progress;
 pub use out_of_core::{LEAST_MEMORY, Limits, MOST_THREADS, OutOfCoreError, build_within};
 pub use remains::Remains;
 
-use edge_lengths::EdgeLengths;
+use crate::edge_lengths::{EdgeLengths, power_of_two};
 use marks::Marks;
 use nodes::{Nodes, round_up};
 use quadric::Quadric;
@@ -101,6 +100,8 @@ pub struct Report {
     pub windows: u64,
     /// See [`windows`](Self::windows).
     pub loaded: u64,
+    /// Where the mesh lies in the world.
+    pub georeference: Georeference,
     /// Time to prepare: renumbering, quadrics.
     pub preparation: Duration,
     /// Time of the rounds.
@@ -120,11 +121,14 @@ pub fn build(mesh: Mesh, options: &Options, progress: Progress) -> Result<(Colla
     let mesh = &log.mesh;
     let extent = mesh.extent();
     let given: Vec<Vec3> = mesh.positions.iter().map(|&p| p.into()).collect();
-    let mut lengths = EdgeLengths::new();
+    let mut lengths = EdgeLengths::default();
     for t in mesh.triangles.iter().filter(|t| !is_flat(**t)) {
-        lengths.add(t.map(|v| given[v as usize]));
+        lengths.add(t.map(|v| mesh.positions[v as usize].map(f64::from)));
     }
-    let unit = lengths.unit();
+    // Keys and quadrics are single-precision numbers of up to four lengths multiplied. They neither overflow nor vanish as
+    // long as lengths are within nine orders of magnitude of the unit, so this is what most edges are like, and not the
+    // extent, which a single vertex far out can make as large as it likes.
+    let unit = power_of_two(lengths.median());
 
     // `order[new] = input number`.
     let order = spatial_order::spatial_order(&given);
@@ -187,6 +191,7 @@ pub fn build(mesh: Mesh, options: &Options, progress: Progress) -> Result<(Colla
         inversions,
         windows: 0,
         loaded: 0,
+        georeference: log.mesh.georeference.clone(),
         preparation,
         simplification,
         conclusion: start.elapsed(),

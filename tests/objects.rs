@@ -2,6 +2,7 @@
 
 mod common;
 
+use std::path::Path;
 use std::sync::Arc;
 
 use common::graph_cut::{self, GraphCut};
@@ -80,6 +81,11 @@ fn scene_files() {
     assert_eq!(objects[0], (folder.path().join("a.mt"), Placement::IDENTITY));
     assert_eq!(objects[1].0, folder.path().join("my  dragon.mt"));
     assert_eq!(objects[1].1.translation, DVec3::new(0.0, 0.0, 9.0));
+    // Byte order marks are no part of a name, nor of a comment.
+    let marked =
+        read(&format!("\u{feff}a.mt {unit} 0\n\u{feff}# two files, joined\nb.mt {unit} 0\n")).unwrap();
+    let names: Vec<_> = marked.iter().map(|(name, _)| name.strip_prefix(folder.path()).unwrap()).collect();
+    assert_eq!(names, [Path::new("a.mt"), Path::new("b.mt")]);
     let message = |text: &str| read(text).unwrap_err().to_string();
     assert!(message(&format!("# a\na.mt {unit}\n")).contains("line 2: 12 words"));
     assert!(

@@ -19,6 +19,7 @@ fn a_path_is_read() {
     assert_eq!((path.name.as_str(), path.units.as_str(), path.aspect), ("walk", "m", 1.5));
     assert_eq!(path.fov_y, 60f64.to_radians());
     assert_eq!(path.frames[1].position, DVec3::new(1.0, 2.0, 4.0));
+    assert_eq!(parse(&format!("\u{feff}{GOOD}")).unwrap(), path);
     assert_eq!(path.camera(1).orientation, DQuat::from_xyzw(0.0, 0.0, 0.6, 0.8));
     assert_eq!(parse("# fov 1.25 rad\n#aspect 2\n0 0 0 0 0 0 0 2").unwrap().fov_y, 1.25);
     assert_eq!(parse("# fov 60\n#aspect 2\n0 0 0 0 0 0 0 2").unwrap().frames[0].orientation, DQuat::IDENTITY);

@@ -77,6 +77,42 @@ pub enum MeshIoError {
         /// The file; the first one of a mosaic.
         file: PathBuf,
     },
+    /// There are vertices, and nothing that joins them.
+    #[error("{}: a point cloud: {points} points and no faces", file.display())]
+    PointCloud {
+        /// The file.
+        file: PathBuf,
+        /// How many vertices there are.
+        points: u64,
+    },
+    /// Its contents are not what the extension says.
+    #[error("{}: not a {format} file", file.display())]
+    WrongFormat {
+        /// The file.
+        file: PathBuf,
+        /// What the extension says.
+        format: &'static str,
+    },
+    /// The file holds more than it announces.
+    #[error("{}: {place}: more than is announced: {found}", file.display())]
+    LeftOver {
+        /// The file.
+        file: PathBuf,
+        /// Where that begins.
+        place: Place,
+        /// What it is, or its beginning.
+        found: String,
+    },
+    /// The length of a binary STL file is that of another number of facets than it announces, and of no whole number.
+    #[error("{}: {facets} facets are announced, but {bytes} bytes are no whole number of them", file.display())]
+    FacetCount {
+        /// The file.
+        file: PathBuf,
+        /// As announced.
+        facets: u32,
+        /// The length of the file.
+        bytes: u64,
+    },
     /// The file ends before everything it announces has been read.
     #[error("{}: {place}: the file ends too early", file.display())]
     Truncated {

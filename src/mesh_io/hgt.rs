@@ -9,7 +9,7 @@
 //! Positions are metres in the local equirectangular projection about the middle of the mosaic: x to the east, y to
 //! the north, z up from sea level. With latitude f and longitude l in radians, (f0, l0) the middle and R the Earth's
 //! mean radius, x = R cos(f0) (l - l0) and y = R (f - f0). Away from f0 true east-west lengths differ by
-//! cos(f) / cos(f0); a mosaic must not span more than 20 degrees.
+//! cos(f) / cos(f0); a mosaic must not span more than 20 degrees, be it across 180 degrees of longitude.
 
 use std::ffi::OsStr;
 use std::fs::File;
@@ -17,13 +17,13 @@ use std::io::{BufReader, Read, Seek, SeekFrom, Write};
 use std::ops::Range;
 use std::path::{Path, PathBuf};
 
+use vertex_tree::DegreeMap;
 use zip::ZipArchive;
 use zip::result::ZipError;
 
 use super::input::Input;
 use super::terrain::{self, HeightGrid};
-use super::{MeshIoError, Place, Receiver};
-use crate::Mesh;
+use super::{Contents, MeshIoError, Place, Receiver};
 use crate::progress::Progress;
 
 /// Greatest width and height of a mosaic, in degrees.
@@ -31,6 +31,8 @@ pub(super) const MAX_SPAN: i32 = 20;
 /// Metres on the ground in a degree of latitude, from the mean radius of the Earth (IUGG).
 pub(super) const METRES_PER_DEGREE: f64 = 6_371_008.8 * std::f64::consts::PI / 180.0;
 const VOID: i16 = i16::MIN;
+/// What longitudes and latitudes are in: WGS 84.
+const COORDINATE_SYSTEM: &str = "EPSG:4326";
 
 /// A tile that has been found but not read.
 struct Found {
@@ -55,28 +57,41 @@ fn find(inputs: &[&Path], progress: Progress<'_>) -> Result<Vec<Found>, MeshIoEr
             found.push(Found::new(input.to_owned(), bytes)?);
         }
     }
+    join_across_180(&mut found);
     found.sort_by_key(|tile| (-tile.south, tile.west));
     check_mosaic(&found)?;
     Ok(found)
 }
 
-/// Reads `.hgt` files and `.zip` archives of them as one mosaic.
-pub(super) fn read(inputs: &[&Path], progress: Progress<'_>) -> Result<Mesh, MeshIoError> {
-    let found = find(inputs, progress)?;
-    let mosaic = open_mosaic(&found, None, &mut *progress)?;
-    terrain::to_mesh(&mosaic, &found[0].path, progress)
-}
-
-/// As [`read`], but row by row. Tiles that are in archives are unpacked into temporary files in `folder`.
+/// Hands `.hgt` files and `.zip` archives of them on as one mosaic: from memory, or row by row if there is a folder into which
+/// archived tiles can be unpacked.
 pub(super) fn send(
     inputs: &[&Path],
-    folder: &Path,
+    folder: Option<&Path>,
     receiver: &mut dyn Receiver,
     progress: Progress<'_>,
-) -> Result<(), MeshIoError> {
+) -> Result<Contents, MeshIoError> {
     let found = find(inputs, progress)?;
-    let mosaic = open_mosaic(&found, Some(folder), &mut *progress)?;
-    terrain::send(&mosaic, &found[0].path, receiver, progress)
+    let mosaic = open_mosaic(&found, folder, &mut *progress)?;
+    receiver.georeference(COORDINATE_SYSTEM, Some(mosaic.degrees));
+    terrain::send(&mosaic, &found[0].path, receiver, progress)?;
+    Ok(Contents { faces: true })
+}
+
+/// Where tiles lie on both sides of 180 degrees, counts longitudes on beyond it: they begin behind the widest gap.
+fn join_across_180(found: &mut [Found]) {
+    for tile in &mut *found {
+        // E180 is W180.
+        tile.west = (tile.west + 180).rem_euclid(360) - 180;
+    }
+    let mut wests: Vec<i32> = found.iter().map(|tile| tile.west).collect();
+    wests.sort_unstable();
+    let (Some(&first), Some(&last)) = (wests.first(), wests.last()) else { return };
+    let around = first + 360 - last;
+    let widest = wests.windows(2).map(|pair| (pair[1] - pair[0], pair[1])).max_by_key(|&(gap, _)| gap);
+    if let Some((_, start)) = widest.filter(|&(gap, _)| gap > around) {
+        found.iter_mut().filter(|tile| tile.west < start).for_each(|tile| tile.west += 360);
+    }
 }
 
 /// Reads all tiles, or unpacks them into a folder where one is given.
@@ -128,7 +143,7 @@ fn find_in_archive(path: &Path, found: &mut Vec<Found>) -> Result<(), MeshIoErro
 }
 
 fn open_archive(path: &Path) -> Result<ZipArchive<BufReader<File>>, MeshIoError> {
-    let file = File::open(path).map_err(|e| super::input::open_error(path, e))?;
+    let file = super::input::open_file(path)?;
     ZipArchive::new(BufReader::new(file)).map_err(|e| archive_error(path, e))
 }
 
@@ -217,7 +232,7 @@ enum Samples {
 
 impl Samples {
     fn open(tile: &Found) -> Result<Self, MeshIoError> {
-        let file = File::open(&tile.path).map_err(|e| super::input::open_error(&tile.path, e))?;
+        let file = super::input::open_file(&tile.path)?;
         Ok(Self::File { path: tile.path.clone(), file })
     }
 
@@ -262,6 +277,7 @@ struct Mosaic {
     columns: usize,
     /// Metres between samples.
     spacing: [f64; 2],
+    degrees: DegreeMap,
 }
 
 impl Mosaic {
@@ -273,6 +289,8 @@ impl Mosaic {
         let cells = side - 1;
         let middle = f64::midpoint(f64::from(top + 1), f64::from(bottom));
         let step = METRES_PER_DEGREE / cells as f64;
+        let narrowing = middle.to_radians().cos();
+        let longitude = f64::midpoint(f64::from(west), f64::from(east));
         Self {
             tiles,
             cells,
@@ -280,7 +298,12 @@ impl Mosaic {
             west,
             bands: (top - bottom + 1) as usize,
             columns: (east - west) as usize * cells + 1,
-            spacing: [step * middle.to_radians().cos(), step],
+            spacing: [step * narrowing, step],
+            degrees: DegreeMap {
+                longitude: if longitude > 180.0 { longitude - 360.0 } else { longitude },
+                latitude: middle,
+                metres_per_degree: [METRES_PER_DEGREE * narrowing, METRES_PER_DEGREE],
+            },
         }
     }
 
@@ -339,6 +362,7 @@ impl HeightGrid for Mosaic {
 
 #[cfg(test)]
 mod tests {
+    use super::super::Collector;
     use super::*;
 
     #[test]
@@ -395,7 +419,9 @@ mod tests {
                 [320, 321, 322, -1, -1],
             ]
         );
-        let mesh = terrain::to_mesh(&mosaic, Path::new(""), &mut |_, _| ()).unwrap();
+        let mut collector = Collector::default();
+        terrain::send(&mosaic, Path::new(""), &mut collector, &mut |_, _| ()).unwrap();
+        let mesh = collector.into_mesh();
         // No triangle spans the corner of the hole, though three samples around it are there.
         assert_eq!((mesh.positions.len(), mesh.triangles.len()), (21, 24));
         // Centred, and a degree is a degree.

@@ -1,7 +1,7 @@
 //! An open file that knows its name, its length and how far it has been read.
 
 use std::error::Error;
-use std::fs::File;
+use std::fs::{self, File};
 use std::io::{self, BufRead, BufReader, Read, Seek, SeekFrom};
 use std::path::Path;
 
@@ -10,6 +10,9 @@ use crate::progress::Progress;
 
 /// Progress is reported each time so many bytes have been read.
 const REPORT_BYTES: u64 = 1 << 20;
+
+/// U+FEFF in UTF-8.
+pub(super) const BYTE_ORDER_MARK: &[u8] = "\u{feff}".as_bytes();
 
 pub(super) struct Input<'a> {
     pub path: &'a Path,
@@ -24,7 +27,7 @@ pub(super) struct Input<'a> {
 
 impl<'a> Input<'a> {
     pub fn open(path: &'a Path, progress: Progress<'a>) -> Result<Self, MeshIoError> {
-        let file = File::open(path).map_err(|e| open_error(path, e))?;
+        let file = open_file(path)?;
         let length = file.metadata().map_err(|e| open_error(path, e))?.len();
         let reader = BufReader::with_capacity(1 << 16, file);
         Ok(Self { path, length, position: 0, reader, progress, next_report: 0 })
@@ -45,6 +48,18 @@ impl<'a> Input<'a> {
         MeshIoError::Unsupported { file: self.path.to_owned(), feature: feature.into() }
     }
 
+    /// Goes past a byte order mark, with which some editors begin text in UTF-8. To be called at the start.
+    pub fn skip_mark(&mut self) -> Result<(), MeshIoError> {
+        let file = self.path;
+        let start = self.fill_buf().map_err(|e| read_error(file, Place::Byte(0), e))?;
+        if start.starts_with(BYTE_ORDER_MARK) {
+            self.consume(BYTE_ORDER_MARK.len());
+        } else if start.starts_with(b"\xff\xfe") || start.starts_with(b"\xfe\xff") {
+            return Err(self.unsupported("text in UTF-16: it has to be UTF-8 or ASCII"));
+        }
+        Ok(())
+    }
+
     fn advance(&mut self, bytes: usize) {
         self.position += bytes as u64;
         if self.position >= self.next_report {
@@ -52,6 +67,15 @@ impl<'a> Input<'a> {
             self.next_report = self.position + REPORT_BYTES;
         }
     }
+}
+
+/// Opens a file. What is not one, as a pipe, could not be read twice, and to open it could take for ever.
+pub(super) fn open_file(path: &Path) -> Result<File, MeshIoError> {
+    let kind = fs::metadata(path).map_err(|e| open_error(path, e))?;
+    if !kind.is_file() {
+        return Err(open_error(path, io::Error::new(io::ErrorKind::InvalidInput, "is not a file")));
+    }
+    File::open(path).map_err(|e| open_error(path, e))
 }
 
 pub(super) fn open_error(path: &Path, source: io::Error) -> MeshIoError {

@@ -8,28 +8,33 @@ use std::path::Path;
 use super::input::Input;
 use super::polygon::{FaceSender, Faces};
 use super::text::{Line, Lines};
-use super::{MAX_VERTICES, MeshIoError, Place, Receiver};
-use crate::Mesh;
+use super::{Contents, MAX_VERTICES, MeshIoError, Place, Receiver};
 use crate::progress::Progress;
 
-pub(super) fn read(mut input: Input<'_>) -> Result<Mesh, MeshIoError> {
-    let file = input.path;
-    let mut positions = Vec::new();
+/// Hands the mesh on, with the faces in memory until their vertices are there.
+pub(super) fn read(
+    file: &Path,
+    receiver: &mut dyn Receiver,
+    progress: Progress<'_>,
+) -> Result<Contents, MeshIoError> {
     let mut faces = Faces::new(Place::Line);
-    let mut lines = Lines::new(&mut input).with_comments('#').with_continuation();
+    let (mut vertices, mut others) = (0, false);
+    let mut input = Input::open(file, progress)?;
+    let mut lines = lines(&mut input)?;
     while let Some(mut line) = lines.next()? {
         match line.word() {
-            Some("v") => positions.push(line.position()?),
+            Some("v") => send_vertex(&mut line, file, &mut vertices, receiver)?,
             Some("f") => {
                 while let Some(word) = line.word() {
-                    faces.push_corner(vertex(&line, word, positions.len())?);
+                    faces.push_corner(vertex(&line, word, vertices)?);
                 }
                 faces.end_face(line.number);
             }
-            _ => {}
+            word => others |= is_shape(word),
         }
     }
-    faces.into_mesh(file, positions, 1)
+    faces.send(&mut FaceSender::new(receiver, vertices, file), 1)?;
+    Ok(Contents { faces: others || !faces.is_empty() })
 }
 
 /// As [`read`], but piece by piece: once through the file for the vertices, once for the faces.
@@ -37,24 +42,20 @@ pub(super) fn send(
     file: &Path,
     receiver: &mut dyn Receiver,
     progress: Progress<'_>,
-) -> Result<(), MeshIoError> {
+) -> Result<Contents, MeshIoError> {
     let mut vertices = 0;
     let mut input = Input::open(file, &mut *progress)?;
-    let mut lines = Lines::new(&mut input).with_comments('#').with_continuation();
-    while let Some(mut line) = lines.next()? {
+    let mut first = lines(&mut input)?;
+    while let Some(mut line) = first.next()? {
         if line.word() == Some("v") {
-            if vertices == MAX_VERTICES {
-                return Err(MeshIoError::TooManyVertices { file: file.to_owned() });
-            }
-            receiver.position(line.position()?).map_err(MeshIoError::Receiver)?;
-            vertices += 1;
+            send_vertex(&mut line, file, &mut vertices, receiver)?;
         }
     }
     let mut sender = FaceSender::new(receiver, vertices, file);
     let mut input = Input::open(file, progress)?;
-    let mut lines = Lines::new(&mut input).with_comments('#').with_continuation();
-    let (mut so_far, mut corners) = (0, Vec::new());
-    while let Some(mut line) = lines.next()? {
+    let mut second = lines(&mut input)?;
+    let (mut so_far, mut corners, mut faces) = (0, Vec::new(), false);
+    while let Some(mut line) = second.next()? {
         match line.word() {
             Some("v") => so_far += 1,
             Some("f") => {
@@ -63,11 +64,35 @@ pub(super) fn send(
                     corners.push(vertex(&line, word, so_far)?);
                 }
                 sender.send(&corners, Place::Line(line.number), 1)?;
+                faces = true;
             }
-            _ => {}
+            word => faces |= is_shape(word),
         }
     }
-    Ok(())
+    Ok(Contents { faces })
+}
+
+fn lines<'i, 'a>(input: &'i mut Input<'a>) -> Result<Lines<'i, 'a>, MeshIoError> {
+    input.skip_mark()?;
+    Ok(Lines::new(input).with_comments('#').with_continuation())
+}
+
+fn send_vertex(
+    line: &mut Line<'_>,
+    file: &Path,
+    vertices: &mut usize,
+    receiver: &mut dyn Receiver,
+) -> Result<(), MeshIoError> {
+    if *vertices == MAX_VERTICES {
+        return Err(MeshIoError::TooManyVertices { file: file.to_owned() });
+    }
+    *vertices += 1;
+    receiver.position(line.position()?).map_err(MeshIoError::Receiver)
+}
+
+/// Whether a line shows something that is not read: lines, curves and surfaces.
+fn is_shape(keyword: Option<&str>) -> bool {
+    matches!(keyword, Some("l" | "curv" | "curv2" | "surf"))
 }
 
 /// The vertex of a corner `v`, `v/vt`, `v//vn` or `v/vt/vn`, counted from 0. In the file it counts from 1, or from

@@ -1,306 +1,225 @@
-//! The Stanford polygon format: read in text and both binary forms, written in little-endian binary.
+//! The Stanford polygon format: read in text and both binary forms.
 //!
 //! Vertices are the properties `x y z` of the element `vertex`, faces the list `vertex_indices` or `vertex_index` of
-//! the element `face`, whatever their types and order; everything else is skipped.
+//! the element `face`, whatever their types and order; everything else is skipped. The same list of the element `tristrips`
+//! holds triangle strips, as scanners wrote them: each further vertex makes a triangle with the two before it, every second of which
+//! is turned, and a negative number ends a strip. (Turk, "The PLY polygon file format", 1994, and what Stanford's own
+//! files do.)
+//!
+//! A row of a text file may go over several lines, and several rows may be on one. Rows that do not fit the header are noticed by what is
+//! left over in the end.
 
-use std::cell::RefCell;
-use std::fs::File;
-use std::io::{self, BufRead, BufWriter, Read, Write};
+mod body;
+mod header;
+
 use std::path::Path;
 
-use serde::Deserialize;
-use serde::de::MapAccess;
-use serde_ply::{DeserializeError, PlyFormat, PlyReader, RowVisitor};
+use serde_ply::{ElementDef, PropertyType, ScalarType};
 
 use super::input::Input;
-use super::polygon::{FaceSender, Faces};
-use super::{MAX_VERTICES, MeshIoError, Place, Receiver};
+use super::polygon::{FaceSender, MAX_CORNERS};
+use super::text::check_coordinate;
+use super::{Contents, MAX_VERTICES, MeshIoError, Place, Receiver};
 use crate::progress::Progress;
-use crate::{Mesh, output};
+use body::{Body, is_float};
 
-#[derive(Deserialize)]
-struct Vertex {
-    x: f32,
-    y: f32,
-    z: f32,
-}
+const STRIPS: [&str; 2] = ["tristrips", "tristrip"];
 
-#[derive(Deserialize)]
-struct Face {
-    #[serde(alias = "vertex_index")]
-    vertex_indices: Vec<i64>,
-}
-
-#[derive(Deserialize)]
-struct Skipped {}
-
-/// What has been read, and how far.
-struct Contents {
-    positions: Vec<[f32; 3]>,
-    faces: Faces,
-    face_count: u64,
-    /// The first coordinate or index that no mesh can have.
-    wrong: Option<Wrong>,
-    /// The row being read, where it belongs to an element of interest.
-    place: Option<Place>,
-}
-
-enum Wrong {
-    Coordinate { vertex: u64, value: f64 },
-    Index { face: u64, index: i64 },
-}
-
-pub(super) fn read(mut input: Input<'_>) -> Result<Mesh, MeshIoError> {
-    let mut contents = Contents {
-        positions: Vec::new(),
-        faces: Faces::new(Place::Face),
-        face_count: 0,
-        wrong: None,
-        place: None,
-    };
-    // The library wants white space behind the last word of a text file. In a binary file it would be data.
-    let mut line_end = &b"\n"[..];
-    let outcome = contents.read_from((&mut input).chain(&mut line_end));
-    let file = || input.path.to_owned();
-    let place = contents.place.unwrap_or(Place::Byte(input.position));
-    match outcome {
-        Ok(PlyFormat::Ascii) => {}
-        Ok(_) if line_end.is_empty() => return Err(MeshIoError::Truncated { file: file(), place }),
-        Ok(_) => {}
-        Err(DeserializeError(error)) => return Err(input.io(place, error)),
-    }
-    match contents.wrong {
-        None => contents.faces.into_mesh(input.path, contents.positions, 0),
-        Some(Wrong::Coordinate { vertex, value }) => {
-            Err(MeshIoError::NotFinite { file: file(), place: Place::Vertex(vertex), value })
-        }
-        Some(Wrong::Index { face, index }) => {
-            let vertices = contents.positions.len();
-            Err(MeshIoError::IndexOutOfRange { file: file(), place: Place::Face(face), index, vertices })
-        }
-    }
-}
-
-impl Contents {
-    fn read_from(&mut self, reader: impl BufRead) -> Result<PlyFormat, DeserializeError> {
-        let mut reader = PlyReader::from_reader(reader)?;
-        let format = reader.header().format;
-        check_elements(&reader)?;
-        while let Some(element) = reader.current_element() {
-            match element.name.as_str() {
-                "vertex" => {
-                    self.place = Some(Place::Vertex(0));
-                    let rows = &mut RowVisitor::new(|vertex| self.push_vertex(&vertex));
-                    (&mut reader).next_value_seed(rows)?;
-                }
-                "face" => {
-                    self.place = Some(Place::Face(0));
-                    let rows = &mut RowVisitor::new(|face| self.push_face(&face));
-                    (&mut reader).next_value_seed(rows)?;
-                }
-                _ => (&mut reader).next_value_seed(&mut RowVisitor::new(|_: Skipped| {}))?,
-            }
-            self.place = None;
-        }
-        Ok(format)
-    }
-
-    fn push_vertex(&mut self, &Vertex { x, y, z }: &Vertex) {
-        let vertex = self.positions.len() as u64;
-        if let Some(value) = [x, y, z].into_iter().find(|c| !c.is_finite()) {
-            self.wrong.get_or_insert(Wrong::Coordinate { vertex, value: f64::from(value) });
-        }
-        self.positions.push([x, y, z]);
-        self.place = Some(Place::Vertex(vertex + 1));
-    }
-
-    fn push_face(&mut self, Face { vertex_indices }: &Face) {
-        let face = self.face_count;
-        for &index in vertex_indices {
-            match u32::try_from(index) {
-                Ok(vertex) => self.faces.push_corner(vertex),
-                Err(_) => drop(self.wrong.get_or_insert(Wrong::Index { face, index })),
-            }
-        }
-        self.faces.end_face(face);
-        self.face_count += 1;
-        self.place = Some(Place::Face(self.face_count));
-    }
-}
-
-/// Refuses elements without properties: their rows would take no bytes, and reading them all could take forever.
-fn check_elements<R: BufRead>(reader: &PlyReader<R>) -> Result<(), DeserializeError> {
-    let mut elements = reader.header().elem_defs.iter();
-    match elements.find(|e| e.properties.is_empty() && e.count > 0) {
-        None => Ok(()),
-        Some(element) => {
-            let message = format!("element {} has no properties", element.name);
-            Err(io::Error::new(io::ErrorKind::InvalidData, message).into())
-        }
-    }
-}
-
-/// As [`read`], but piece by piece. Where faces come before the vertices, the file is read twice.
+/// Hands the mesh on. Where faces come before the vertices, the file is read twice.
 pub(super) fn send(
     file: &Path,
     receiver: &mut dyn Receiver,
-    mut progress: Progress<'_>,
+    progress: Progress<'_>,
+) -> Result<Contents, MeshIoError> {
+    let mut reading =
+        Reading { file, receiver, vertices: 0, with_vertices: true, late_faces: false, faces: false };
+    reading.read(&mut *progress)?;
+    if reading.late_faces {
+        reading.with_vertices = false;
+        reading.read(progress)?;
+    }
+    Ok(Contents { faces: reading.faces })
+}
+
+struct Reading<'r> {
+    file: &'r Path,
+    receiver: &'r mut dyn Receiver,
+    /// How many have been handed on.
+    vertices: usize,
+    /// Whether vertices are asked for, or else are there already.
+    with_vertices: bool,
+    /// Whether there are faces before the vertices.
+    late_faces: bool,
+    /// Whether there are any.
+    faces: bool,
+}
+
+impl Reading<'_> {
+    /// Reads the file once, and hands on vertices, if they are asked for, and those faces that come when there are vertices.
+    fn read(&mut self, progress: Progress<'_>) -> Result<(), MeshIoError> {
+        let mut input = Input::open(self.file, progress)?;
+        let (header, lines) = header::read(&mut input)?;
+        let mut body = Body::new(&mut input, header.format, lines);
+        let last_vertices = header.elem_defs.iter().rposition(|e| e.name == "vertex" && e.count > 0);
+        for (number, element) in header.elem_defs.iter().enumerate() {
+            let is_strips = STRIPS.contains(&&*element.name);
+            let is_late = self.with_vertices && last_vertices.is_some_and(|last| number < last);
+            // What is late now comes the second time, and what has come already does not.
+            let is_wanted =
+                if self.with_vertices { !is_late } else { last_vertices.is_some_and(|last| number < last) };
+            match element.name.as_str() {
+                "vertex" if self.with_vertices => self.read_vertices(element, &mut body)?,
+                "face" | "tristrips" | "tristrip" if element.count > 0 => {
+                    self.faces = true;
+                    self.late_faces |= is_late;
+                    match is_wanted {
+                        true if is_strips => self.read_strips(element, &mut body)?,
+                        true => self.read_faces(element, &mut body)?,
+                        false => skip_rows(element, Place::Face, &mut body)?,
+                    }
+                }
+                "vertex" => skip_rows(element, Place::Vertex, &mut body)?,
+                _ => skip_rows(element, |_| Place::Byte(0), &mut body)?,
+            }
+        }
+        body.expect_end()
+    }
+
+    fn read_vertices(&mut self, element: &ElementDef, body: &mut Body<'_, '_>) -> Result<(), MeshIoError> {
+        let axes: Vec<Option<usize>> = element
+            .properties
+            .iter()
+            .map(|p| ["x", "y", "z"].iter().position(|axis| *axis == p.name))
+            .collect();
+        for (axis, name) in ["x", "y", "z"].into_iter().enumerate() {
+            let is_there = element.properties.iter().zip(&axes).any(|(property, found)| {
+                *found == Some(axis) && matches!(property.property_type, PropertyType::Scalar(_))
+            });
+            if !is_there && element.count > 0 {
+                return Err(
+                    body.refuse(Place::Vertex(self.vertices as u64), &format!("missing field `{name}`"))
+                );
+            }
+        }
+        for _ in 0..element.count {
+            let place = Place::Vertex(self.vertices as u64);
+            let mut position = [0.0; 3];
+            for (property, axis) in element.properties.iter().zip(&axes) {
+                match (&property.property_type, axis) {
+                    (&PropertyType::Scalar(kind), &Some(axis)) => {
+                        position[axis] = check_coordinate(self.file, place, body.number(kind, place)?)?;
+                    }
+                    (kind, _) => skip(kind, place, body)?,
+                }
+            }
+            if self.vertices == MAX_VERTICES {
+                return Err(MeshIoError::TooManyVertices { file: self.file.to_owned() });
+            }
+            self.receiver.position(position).map_err(MeshIoError::Receiver)?;
+            self.vertices += 1;
+        }
+        Ok(())
+    }
+
+    fn read_faces(&mut self, element: &ElementDef, body: &mut Body<'_, '_>) -> Result<(), MeshIoError> {
+        let vertices = self.vertices;
+        let mut sender = FaceSender::new(self.receiver, vertices, self.file);
+        let mut corners = Vec::new();
+        for_each_list(element, body, |count, kind, place, body| {
+            if count > MAX_CORNERS as u64 {
+                let corners = usize::try_from(count).unwrap_or(usize::MAX);
+                return Err(MeshIoError::TooManyCorners { file: sender.file.to_owned(), place, corners });
+            }
+            corners.clear();
+            for _ in 0..count {
+                let index = body.whole(kind, place)?;
+                let vertex = u32::try_from(index).map_err(|_| {
+                    let file = sender.file.to_owned();
+                    MeshIoError::IndexOutOfRange { file, place, index, vertices }
+                })?;
+                corners.push(vertex);
+            }
+            sender.send(&corners, place, 0)
+        })
+    }
+
+    fn read_strips(&mut self, element: &ElementDef, body: &mut Body<'_, '_>) -> Result<(), MeshIoError> {
+        let vertices = self.vertices;
+        let mut sender = FaceSender::new(self.receiver, vertices, self.file);
+        for_each_list(element, body, |count, kind, place, body| {
+            let mut before: [Option<u32>; 2] = [None; 2];
+            let mut is_turned = false;
+            for _ in 0..count {
+                let index = body.whole(kind, place)?;
+                // Where numbers have no sign, -1 is written as the largest.
+                if index < 0 || kind == ScalarType::U32 && index == i64::from(u32::MAX) {
+                    (before, is_turned) = ([None; 2], false);
+                    continue;
+                }
+                let Some(vertex) = u32::try_from(index).ok().filter(|&v| (v as usize) < vertices) else {
+                    let file = sender.file.to_owned();
+                    return Err(MeshIoError::IndexOutOfRange { file, place, index, vertices });
+                };
+                if let [Some(a), Some(b)] = before {
+                    let triangle = if is_turned { [b, a, vertex] } else { [a, b, vertex] };
+                    sender.send(&triangle, place, 0)?;
+                    is_turned = !is_turned;
+                }
+                before = [before[1], Some(vertex)];
+            }
+            Ok(())
+        })
+    }
+}
+
+/// Calls `take` for each row when its list of vertices comes, with the number of items, which it has to read.
+fn for_each_list(
+    element: &ElementDef,
+    body: &mut Body<'_, '_>,
+    mut take: impl FnMut(u64, ScalarType, Place, &mut Body<'_, '_>) -> Result<(), MeshIoError>,
 ) -> Result<(), MeshIoError> {
-    let mut vertices = 0;
-    let are_late = send_elements(file, receiver, &mut vertices, true, &mut progress)?;
-    if are_late {
-        send_elements(file, receiver, &mut vertices, false, &mut progress)?;
+    let list = element.properties.iter().position(|property| {
+        ["vertex_indices", "vertex_index"].contains(&&*property.name)
+            && matches!(property.property_type, PropertyType::List { .. })
+    });
+    let list = list.ok_or_else(|| body.refuse(Place::Face(0), "missing field `vertex_indices`"))?;
+    for row in 0..element.count as u64 {
+        let place = Place::Face(row);
+        for (number, property) in element.properties.iter().enumerate() {
+            match &property.property_type {
+                &PropertyType::List { count_type, data_type } if number == list => {
+                    if is_float(data_type) {
+                        return Err(body.refuse(place, "the numbers of vertices are not whole numbers"));
+                    }
+                    let count = body.count(count_type, place)?;
+                    take(count, data_type, place, body)?;
+                }
+                kind => skip(kind, place, body)?,
+            }
+        }
     }
     Ok(())
 }
 
-/// Reads the file once, and hands on vertices, if they are asked for, and those faces that come when there are vertices.
-/// Says whether there are others.
-fn send_elements(
-    path: &Path,
-    receiver: &mut dyn Receiver,
-    vertices: &mut usize,
-    with_vertices: bool,
-    progress: Progress<'_>,
-) -> Result<bool, MeshIoError> {
-    let mut input = Input::open(path, progress)?;
-    // What a row has led to: rows can not fail, so the file seems to end there.
-    let failed = RefCell::new(None);
-    let fail = |error| {
-        failed.borrow_mut().get_or_insert(error);
-    };
-    let mut are_late = false;
-    let mut place = None;
-    let mut line_end = &b"\n"[..];
-    let outcome = (|| -> Result<PlyFormat, DeserializeError> {
-        let reader = Stopping { reader: (&mut input).chain(&mut line_end), failed: &failed };
-        let mut reader = PlyReader::from_reader(reader)?;
-        let format = reader.header().format;
-        check_elements(&reader)?;
-        while let Some(element) = reader.current_element() {
-            match element.name.as_str() {
-                "vertex" if with_vertices => {
-                    place = Some(Place::Vertex(*vertices as u64));
-                    let rows = &mut RowVisitor::new(|Vertex { x, y, z }: Vertex| {
-                        let here = Place::Vertex(*vertices as u64);
-                        let wrong = [x, y, z].into_iter().find(|c| !c.is_finite());
-                        if failed.borrow().is_some() {
-                        } else if let Some(value) = wrong.map(f64::from) {
-                            fail(MeshIoError::NotFinite { file: path.to_owned(), place: here, value });
-                        } else if *vertices == MAX_VERTICES {
-                            fail(MeshIoError::TooManyVertices { file: path.to_owned() });
-                        } else if let Err(error) = receiver.position([x, y, z]) {
-                            fail(MeshIoError::Receiver(error));
-                        }
-                        *vertices += 1;
-                        place = Some(Place::Vertex(*vertices as u64));
-                    });
-                    (&mut reader).next_value_seed(rows)?;
-                }
-                "face" if *vertices > 0 => {
-                    place = Some(Place::Face(0));
-                    let mut sender = FaceSender::new(&mut *receiver, *vertices, path);
-                    let (mut number, mut corners) = (0, Vec::new());
-                    let rows = &mut RowVisitor::new(|Face { vertex_indices }: Face| {
-                        let here = Place::Face(number);
-                        number += 1;
-                        place = Some(Place::Face(number));
-                        corners.clear();
-                        corners.extend(vertex_indices.iter().filter_map(|&v| u32::try_from(v).ok()));
-                        if failed.borrow().is_some() {
-                        } else if let Some(&index) =
-                            vertex_indices.iter().find(|&&v| u32::try_from(v).is_err())
-                        {
-                            let vertices = sender.vertices;
-                            fail(MeshIoError::IndexOutOfRange {
-                                file: path.to_owned(),
-                                place: here,
-                                index,
-                                vertices,
-                            });
-                        } else if let Err(error) = sender.send(&corners, here, 0) {
-                            fail(error);
-                        }
-                    });
-                    (&mut reader).next_value_seed(rows)?;
-                }
-                name => {
-                    are_late |= name == "face";
-                    (&mut reader).next_value_seed(&mut RowVisitor::new(|_: Skipped| {}))?;
-                }
-            }
-            place = None;
-        }
-        Ok(format)
-    })();
-    if let Some(error) = failed.into_inner() {
-        return Err(error);
-    }
-    let place = place.unwrap_or(Place::Byte(input.position));
-    match outcome {
-        Ok(PlyFormat::Ascii) => Ok(are_late),
-        Ok(_) if line_end.is_empty() => Err(MeshIoError::Truncated { file: path.to_owned(), place }),
-        Ok(_) => Ok(are_late),
-        Err(DeserializeError(error)) => Err(input.io(place, error)),
-    }
-}
-
-/// A reader that ends when something else has gone wrong.
-struct Stopping<'f, R> {
-    reader: R,
-    failed: &'f RefCell<Option<MeshIoError>>,
-}
-
-impl<R: BufRead> Read for Stopping<'_, R> {
-    fn read(&mut self, buffer: &mut [u8]) -> io::Result<usize> {
-        if self.failed.borrow().is_some() { Ok(0) } else { self.reader.read(buffer) }
-    }
-}
-
-impl<R: BufRead> BufRead for Stopping<'_, R> {
-    fn fill_buf(&mut self) -> io::Result<&[u8]> {
-        if self.failed.borrow().is_some() { Ok(&[]) } else { self.reader.fill_buf() }
-    }
-
-    fn consume(&mut self, bytes: usize) {
-        self.reader.consume(bytes);
-    }
-}
-
-/// Writes a mesh as binary PLY, with a colour (red, green, blue) for each vertex if there are any: to a temporary
-/// name beside `path`, synced, then renamed.
-///
-/// # Errors
-/// [`MeshIoError::Io`], and [`MeshIoError::ColourCount`] if there are more or fewer colours than vertices.
-pub fn write_ply(path: &Path, mesh: &Mesh, colours: Option<&[[u8; 3]]>) -> Result<(), MeshIoError> {
-    let vertices = mesh.positions.len();
-    if let Some(colours) = colours.map(<[_]>::len).filter(|&n| n != vertices) {
-        return Err(MeshIoError::ColourCount { file: path.to_owned(), colours, vertices });
-    }
-    let io = |source| MeshIoError::Io { file: path.to_owned(), source };
-    output::write_with(path, |file| write_to(file, mesh, colours)).map_err(io)
-}
-
-fn write_to(file: &mut File, mesh: &Mesh, colours: Option<&[[u8; 3]]>) -> io::Result<()> {
-    let mut out = BufWriter::with_capacity(1 << 20, file);
-    writeln!(out, "ply\nformat binary_little_endian 1.0\nelement vertex {}", mesh.positions.len())?;
-    writeln!(out, "property float x\nproperty float y\nproperty float z")?;
-    if colours.is_some() {
-        writeln!(out, "property uchar red\nproperty uchar green\nproperty uchar blue")?;
-    }
-    // Many readers know only `int` here; it serves as long as the numbers fit.
-    let index = if mesh.positions.len() <= i32::MAX as usize { "int" } else { "uint" };
-    writeln!(out, "element face {}", mesh.triangles.len())?;
-    writeln!(out, "property list uchar {index} vertex_indices\nend_header")?;
-    for (vertex, position) in mesh.positions.iter().enumerate() {
-        out.write_all(position.map(f32::to_le_bytes).as_flattened())?;
-        if let Some(colours) = colours {
-            out.write_all(&colours[vertex])?;
+fn skip_rows(
+    element: &ElementDef,
+    place: impl Fn(u64) -> Place,
+    body: &mut Body<'_, '_>,
+) -> Result<(), MeshIoError> {
+    for row in 0..element.count as u64 {
+        for property in &element.properties {
+            skip(&property.property_type, place(row), body)?;
         }
     }
-    for triangle in &mesh.triangles {
-        out.write_all(&[3])?;
-        out.write_all(triangle.map(u32::to_le_bytes).as_flattened())?;
+    Ok(())
+}
+
+fn skip(kind: &PropertyType, place: Place, body: &mut Body<'_, '_>) -> Result<(), MeshIoError> {
+    match *kind {
+        PropertyType::Scalar(kind) => body.skip(1, kind, place),
+        PropertyType::List { count_type, data_type } => {
+            let count = body.count(count_type, place)?;
+            body.skip(count, data_type, place)
+        }
     }
-    out.flush()
 }

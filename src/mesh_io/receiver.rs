@@ -2,15 +2,15 @@
 
 use std::io;
 
-use crate::Mesh;
+use vertex_tree::DegreeMap;
 
 /// Takes the vertices and triangles of a mesh in order. A triangle names vertices that have been taken before it.
 pub trait Receiver {
-    /// Takes a vertex. Coordinates are finite.
+    /// Takes a vertex, in world coordinates. They are finite, and within the range of 32 bits.
     ///
     /// # Errors
     /// Where it can not be kept.
-    fn position(&mut self, position: [f32; 3]) -> io::Result<()>;
+    fn position(&mut self, position: [f64; 3]) -> io::Result<()>;
 
     /// Takes a triangle with three different corners.
     ///
@@ -18,25 +18,13 @@ pub trait Receiver {
     /// Where it can not be kept.
     fn triangle(&mut self, corners: [u32; 3]) -> io::Result<()>;
 
-    /// The position of a vertex that has been taken.
+    /// The position of a vertex that has been taken, to the bit.
     ///
     /// # Errors
     /// Where it can not be had again.
-    fn position_of(&mut self, vertex: u32) -> io::Result<[f32; 3]>;
-}
+    fn position_of(&mut self, vertex: u32) -> io::Result<[f64; 3]>;
 
-impl Receiver for Mesh {
-    fn position(&mut self, position: [f32; 3]) -> io::Result<()> {
-        self.positions.push(position);
-        Ok(())
-    }
-
-    fn triangle(&mut self, corners: [u32; 3]) -> io::Result<()> {
-        self.triangles.push(corners);
-        Ok(())
-    }
-
-    fn position_of(&mut self, vertex: u32) -> io::Result<[f32; 3]> {
-        self.positions.get(vertex as usize).copied().ok_or_else(|| io::ErrorKind::NotFound.into())
-    }
+    /// Takes what the file says of where the mesh lies: the name of the coordinate system, empty where it gives none, and
+    /// how degrees have been laid on a plane. At most once, at any time.
+    fn georeference(&mut self, coordinate_system: &str, degrees: Option<DegreeMap>);
 }

@@ -9,7 +9,6 @@ use std::ops::Range;
 use std::path::Path;
 
 use super::{MAX_VERTICES, MeshIoError, Place, Receiver};
-use crate::Mesh;
 use crate::progress::Progress;
 
 /// Rows of samples from north to south, and columns from west to east.
@@ -32,23 +31,6 @@ pub(super) trait HeightGrid {
 struct Corner {
     south: bool,
     column: usize,
-}
-
-/// Triangulates a grid read from `file`.
-pub(super) fn to_mesh(
-    grid: &impl HeightGrid,
-    file: &Path,
-    progress: Progress<'_>,
-) -> Result<Mesh, MeshIoError> {
-    let (rows, columns) = (grid.rows(), grid.columns());
-    let cells: usize = (0..rows - 1).flat_map(|row| grid.cells(row)).map(|range| range.len()).sum();
-    let mut mesh = Mesh {
-        positions: Vec::with_capacity(cells + rows + columns),
-        triangles: Vec::with_capacity(2 * cells),
-        ..Mesh::default()
-    };
-    send(grid, file, &mut mesh, progress)?;
-    Ok(mesh)
 }
 
 /// Triangulates a grid read from `file`, piece by piece.
@@ -96,7 +78,7 @@ pub(super) fn send(
             }
             vertices[column] = sent as u32;
             sent += 1;
-            receiver.position(position).map_err(MeshIoError::Receiver)?;
+            receiver.position(position.map(f64::from)).map_err(MeshIoError::Receiver)?;
         }
         for triangle in &strip_north {
             let vertex = |c: Corner| if c.south { vertices[c.column] } else { vertices_north[c.column] };
@@ -132,7 +114,9 @@ fn split_cell(north: &[f32], south: &[f32], column: usize, triangles: &mut Vec<[
 
 #[cfg(test)]
 mod tests {
+    use super::super::Collector;
     use super::*;
+    use crate::Mesh;
 
     struct Text<'a>(&'a [&'a str]);
 
@@ -158,7 +142,9 @@ mod tests {
     }
 
     fn mesh(rows: &[&str]) -> Mesh {
-        to_mesh(&Text(rows), Path::new("grid"), &mut |_, _| ()).unwrap()
+        let mut collector = Collector::default();
+        send(&Text(rows), Path::new("grid"), &mut collector, &mut |_, _| ()).unwrap();
+        collector.into_mesh()
     }
 
     #[test]

@@ -1,10 +1,10 @@
 //! Text files line by line, with errors that name the line.
 
-use std::io::BufRead;
+use std::io::{self, BufRead};
 use std::path::Path;
 use std::str::FromStr;
 
-use super::input::Input;
+use super::input::{BYTE_ORDER_MARK, Input};
 use super::{MeshIoError, Place};
 
 /// Lends the lines of a file that hold anything, one after the other.
@@ -14,13 +14,16 @@ pub(super) struct Lines<'i, 'a> {
     /// Whether a backslash at the end joins a line to the next.
     continued: bool,
     bytes: Vec<u8>,
+    /// Whether the last line was ended by a carriage return, to which a line feed behind it belongs.
+    after_return: bool,
     text: String,
     pub number: u64,
 }
 
 impl<'i, 'a> Lines<'i, 'a> {
     pub fn new(input: &'i mut Input<'a>) -> Self {
-        Self { input, comment: None, continued: false, bytes: Vec::new(), text: String::new(), number: 0 }
+        let (bytes, text) = (Vec::new(), String::new());
+        Self { input, comment: None, continued: false, bytes, after_return: false, text, number: 0 }
     }
 
     /// The rest of a line behind `mark` is skipped.
@@ -36,12 +39,13 @@ impl<'i, 'a> Lines<'i, 'a> {
     pub fn next(&mut self) -> Result<Option<Line<'_>>, MeshIoError> {
         self.text.clear();
         loop {
-            self.bytes.clear();
             self.number += 1;
             let place = Place::Line(self.number);
-            let read = self.input.read_until(b'\n', &mut self.bytes).map_err(|e| self.input.io(place, e))?;
+            let read = self.read_line().map_err(|e| self.input.io(place, e))?;
+            // Files that have been joined have byte order marks inside.
+            let bytes = self.bytes.strip_prefix(BYTE_ORDER_MARK).unwrap_or(&self.bytes);
             // Names of groups and materials come in any encoding; all that matters here is ASCII.
-            let text = String::from_utf8_lossy(&self.bytes);
+            let text = String::from_utf8_lossy(bytes);
             let text =
                 self.comment.map_or(&*text, |mark| text.split(mark).next().unwrap_or("")).trim_ascii_end();
             let joined = text.strip_suffix('\\').filter(|_| self.continued);
@@ -51,13 +55,41 @@ impl<'i, 'a> Lines<'i, 'a> {
                 continue;
             }
             self.text.push_str(text);
-            if read == 0 || !self.text.trim_ascii().is_empty() {
+            if !read || !self.text.trim_ascii().is_empty() {
                 break;
             }
             self.text.clear();
         }
         let line = Line { file: self.input.path, number: self.number, rest: self.text.trim_ascii() };
         Ok(if line.is_empty() { None } else { Some(line) })
+    }
+
+    /// Sets `bytes` to the next line, which ends with a line feed, a carriage return, or both; false at the end of the file.
+    fn read_line(&mut self) -> io::Result<bool> {
+        self.bytes.clear();
+        loop {
+            let buffer = self.input.fill_buf()?;
+            let Some(&first) = buffer.first() else { return Ok(!self.bytes.is_empty()) };
+            if std::mem::take(&mut self.after_return) && first == b'\n' {
+                self.input.consume(1);
+                continue;
+            }
+            let end = buffer.iter().position(|b| matches!(b, b'\n' | b'\r'));
+            self.bytes.extend_from_slice(&buffer[..end.unwrap_or(buffer.len())]);
+            let read = end.map_or(buffer.len(), |end| end + 1);
+            self.after_return = end.is_some_and(|end| buffer[end] == b'\r');
+            self.input.consume(read);
+            if end.is_some() {
+                return Ok(true);
+            }
+        }
+    }
+
+    /// The error if there is more in the file, which announces no more than has been read.
+    pub fn expect_end(&mut self) -> Result<(), MeshIoError> {
+        let file = self.input.path;
+        let Some(line) = self.next()? else { return Ok(()) };
+        Err(left_over(file, line.number, line.rest))
     }
 
     /// The next line, where the file may not end yet.
@@ -109,27 +141,17 @@ impl<'l> Line<'l> {
     }
 
     /// The next three words as a point.
-    pub fn position(&mut self) -> Result<[f32; 3], MeshIoError> {
-        let mut position = [0_f32; 3];
+    pub fn position(&mut self) -> Result<[f64; 3], MeshIoError> {
+        let mut position = [0.0; 3];
         for coordinate in &mut position {
             let word = self.word().unwrap_or("");
-            *coordinate = word.parse().map_err(|_| self.malformed("a coordinate", word))?;
-            if !coordinate.is_finite() {
-                let value = word.parse().unwrap_or(f64::NAN);
-                return Err(MeshIoError::NotFinite {
-                    file: self.file.to_owned(),
-                    place: self.place(),
-                    value,
-                });
-            }
+            *coordinate = parse_coordinate(self.file, self.number, word)?;
         }
         Ok(position)
     }
 
     pub fn malformed(&self, expected: &'static str, found: &str) -> MeshIoError {
-        // A line of a damaged file can be the whole file.
-        let found = found.chars().take(40).collect();
-        MeshIoError::Malformed { file: self.file.to_owned(), place: self.place(), expected, found }
+        malformed(self.file, self.place(), expected, found)
     }
 
     pub fn index_out_of_range(&self, index: i64, vertices: usize) -> MeshIoError {
@@ -139,4 +161,34 @@ impl<'l> Line<'l> {
     fn place(&self) -> Place {
         Place::Line(self.number)
     }
+}
+
+/// A coordinate in the range of 32 bits.
+pub(super) fn parse_coordinate(file: &Path, line: u64, word: &str) -> Result<f64, MeshIoError> {
+    let place = Place::Line(line);
+    let value = word.parse().map_err(|_| malformed(file, place, "a coordinate", word))?;
+    check_coordinate(file, place, value)
+}
+
+/// Refuses what is not a number or beyond the range of 32 bits.
+pub(super) fn check_coordinate(file: &Path, place: Place, value: f64) -> Result<f64, MeshIoError> {
+    if (value as f32).is_finite() {
+        return Ok(value);
+    }
+    Err(MeshIoError::NotFinite { file: file.to_owned(), place, value })
+}
+
+pub(super) fn malformed(file: &Path, place: Place, expected: &'static str, found: &str) -> MeshIoError {
+    MeshIoError::Malformed { file: file.to_owned(), place, expected, found: beginning(found) }
+}
+
+/// The error for text behind the end of what the file announces.
+pub(super) fn left_over(file: &Path, line: u64, found: &str) -> MeshIoError {
+    let found = format!("{:?}", beginning(found));
+    MeshIoError::LeftOver { file: file.to_owned(), place: Place::Line(line), found }
+}
+
+/// A line of a damaged file can be the whole file.
+fn beginning(text: &str) -> String {
+    text.chars().take(40).collect()
 }

@@ -75,7 +75,9 @@ pub fn read_scene(path: &Path) -> Result<Vec<(PathBuf, Placement)>, SceneFileErr
     let folder = path.parent().unwrap_or(Path::new(""));
     let mut objects = Vec::new();
     for (line, text) in (1..).zip(text.lines()) {
-        let text = text.trim();
+        // A byte order mark, with which some editors begin text, would be part of the name; files that have been joined have it
+        // inside.
+        let text = text.trim_start_matches('\u{feff}').trim();
         if text.is_empty() || text.starts_with('#') {
             continue;
         }

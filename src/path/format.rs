@@ -128,6 +128,8 @@ impl Path {
         let stem = file.file_stem().map_or_else(String::new, |stem| stem.to_string_lossy().into_owned());
         let mut path =
             Self { name: stem, units: "units".to_owned(), fov_y: 0.0, aspect: 0.0, frames: Vec::new() };
+        // Some editors begin text with a byte order mark.
+        let text = text.strip_prefix('\u{feff}').unwrap_or(text);
         for (index, content) in text.lines().enumerate() {
             let at = Line { file, line: index + 1 };
             let content = content.trim();

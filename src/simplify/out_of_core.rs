@@ -18,6 +18,7 @@
 //! | stage | memory | on disk |
 //! |---|---|---|
 //! | reading | buffers | positions and triangles of the input |
+//! | placing about the middle, unless 32 bits hold all coordinates | a cache of positions | positions in 64 bits |
 //! | sorting (`prepare`) | sort buffers, a cache of vertex numbers | sorted runs |
 //! | passes (`passes`) | one window of blocks | all blocks twice (`blocks`), the collapses so far |
 //! | the rest | all blocks, once they fit | the collapses so far |
@@ -46,10 +47,11 @@ use std::sync::atomic::AtomicBool;
 use std::time::Instant;
 
 use vertex_tree::external::Scratch;
-use vertex_tree::{Bounds, Collapse, LogCounts, LogError, LogFileError, NONE, write_log_from};
+use vertex_tree::{Bounds, Collapse, DegreeMap, LogCounts, LogError, LogFileError, NONE, write_log_from};
 
 use super::key_counts::KeyCounts;
 use super::{Options, Report};
+use crate::edge_lengths::power_of_two;
 use crate::mesh_io::{MeshIoError, Receiver};
 use crate::progress::Progress;
 use log::Log;
@@ -151,19 +153,20 @@ pub fn build_within(
         return Err(failed);
     }
     outcome?;
-    let (vertices, triangles) = (input.positions.len(), input.triangles.len());
+    let (vertices, triangles) = (input.vertices(), input.triangles.len());
     if vertices.max(triangles) >= u64::from(NONE) {
         return Err(OutOfCoreError::TooMany { vertices, triangles });
     }
     let memory = limits.memory.max(LEAST_MEMORY);
     check_room(triangles, &limits.temporary)?;
+    input.place(memory as usize / 2, || passes::check(limits.stop)).map_err(temporary)?;
     let (blocks, live_triangles) = prepare::first_blocks(&mut input, &scratch, memory as usize, |part| {
         progress(100 + part / 10, 1000);
         passes::check(limits.stop)
     })
     .map_err(temporary)?;
     let whole = Whole {
-        unit: input.lengths.unit(),
+        unit: power_of_two(input.lengths.median()),
         extent: input.extent(),
         live_triangles,
         first_id: 0,
@@ -229,6 +232,7 @@ pub fn build_within(
         inversions: log.inversions,
         windows: passes.windows,
         loaded: passes.loaded,
+        georeference: input.georeference,
         preparation,
         simplification,
         conclusion: start.elapsed(),
@@ -291,17 +295,18 @@ impl Receiving<'_> {
 }
 
 impl Receiver for Receiving<'_> {
-    fn position(&mut self, position: [f32; 3]) -> io::Result<()> {
-        let vertex = self.input.positions.len() as usize;
-        if !position.iter().all(|x| x.is_finite()) {
-            return Err(self.fail(LogError::BadPosition { vertex, position }.into()));
+    fn position(&mut self, position: [f64; 3]) -> io::Result<()> {
+        let short = position.map(|x| x as f32);
+        if !short.iter().all(|x| x.is_finite()) {
+            let vertex = self.input.vertices() as usize;
+            return Err(self.fail(LogError::BadPosition { vertex, position: short }.into()));
         }
         let outcome = passes::check(self.limits.stop).and_then(|()| self.input.push_position(position));
         self.keep(outcome)
     }
 
     fn triangle(&mut self, corners: [u32; 3]) -> io::Result<()> {
-        let vertices = self.input.positions.len();
+        let vertices = self.input.vertices();
         if let Some(&vertex) = corners.iter().find(|&&v| u64::from(v) >= vertices) {
             let (triangle, vertices) = (self.input.triangles.len() as usize, vertices as usize);
             return Err(self.fail(LogError::CornerOutOfRange { triangle, vertex, vertices }.into()));
@@ -310,9 +315,14 @@ impl Receiver for Receiving<'_> {
         self.keep(outcome)
     }
 
-    fn position_of(&mut self, vertex: u32) -> io::Result<[f32; 3]> {
-        let outcome = self.input.positions.get(u64::from(vertex));
-        self.keep(outcome).map(|p| p.map(f32::from_bits))
+    fn position_of(&mut self, vertex: u32) -> io::Result<[f64; 3]> {
+        let outcome = self.input.position_of(vertex);
+        self.keep(outcome)
+    }
+
+    fn georeference(&mut self, coordinate_system: &str, degrees: Option<DegreeMap>) {
+        coordinate_system.clone_into(&mut self.input.georeference.coordinate_system);
+        self.input.georeference.degrees = degrees;
     }
 }
 

@@ -48,7 +48,7 @@ fn a_bad_mesh_is_named_with_the_place_in_it() {
         ("truncated.ply", &["truncated.ply: face 2", "ends too early"]),
         ("headless.ply", &["headless.ply: "]),
         ("empty.ply", &["empty.ply: "]),
-        ("faceless.ply", &["faceless.ply: no triangles"]),
+        ("faceless.ply", &["faceless.ply: a point cloud: 4 points and no faces"]),
         ("range.ply", &["range.ply: face 1: no vertex 4, there are 4"]),
         ("negative.ply", &["negative.ply: face 1", "-2"]),
         ("nan.ply", &["nan.ply: vertex 3", "NaN"]),

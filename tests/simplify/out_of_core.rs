@@ -5,7 +5,7 @@ use std::sync::atomic::{AtomicBool, Ordering};
 
 use foldfront::mesh_io::{MeshIoError, Receiver};
 use foldfront::simplify::{LEAST_MEMORY, Limits, OutOfCoreError, Report, build_within};
-use foldfront::vertex_tree::{LogError, read_log};
+use foldfront::vertex_tree::{Georeference, LogError, read_log};
 use foldfront::{CollapseLog, Mesh};
 
 use crate::common::data;
@@ -15,7 +15,10 @@ use crate::{check, difficult, flat_grid, options, simplify};
 const BYTES_A_VERTEX: u64 = 300;
 
 fn send(mesh: &Mesh, receiver: &mut dyn Receiver) -> Result<(), MeshIoError> {
-    mesh.positions.iter().try_for_each(|&p| receiver.position(p)).map_err(MeshIoError::Receiver)?;
+    mesh.positions
+        .iter()
+        .try_for_each(|&p| receiver.position(p.map(f64::from)))
+        .map_err(MeshIoError::Receiver)?;
     mesh.triangles.iter().try_for_each(|&t| receiver.triangle(t)).map_err(MeshIoError::Receiver)
 }
 
@@ -39,6 +42,12 @@ fn build_with(mesh: &Mesh, merge: bool, memory: u64, threads: usize) -> (Collaps
     let report = build_within(|r, _| send(mesh, r), &file, &options(merge), &limits, progress).unwrap();
     assert_eq!(names(folder.path()), ["log"]);
     (read_log(&file).unwrap(), report)
+}
+
+/// A town, about its own middle: where that is in the world is not sent.
+fn town() -> Option<Mesh> {
+    let mesh = data::mesh("city/denhaag01_lod2_terrain.obj")?;
+    Some(Mesh { georeference: Georeference::default(), ..mesh })
 }
 
 fn names(folder: &Path) -> Vec<String> {
@@ -101,7 +110,7 @@ fn the_result_does_not_depend_on_the_number_of_threads() {
 /// Stars that vanish as a whole, and edges that are long for blocks as small as these.
 #[test]
 fn a_town_does_not_depend_on_the_number_of_threads() {
-    let Some(mesh) = data::mesh("city/denhaag01_lod2_terrain.obj") else { return };
+    let Some(mesh) = town() else { return };
     let in_memory = simplify(&mesh, false);
     for threads in [1, 4] {
         let report = assert_same_as(&in_memory, &mesh, false, 4 << 20, threads);
@@ -111,7 +120,7 @@ fn a_town_does_not_depend_on_the_number_of_threads() {
 
 #[test]
 fn components_are_merged_as_in_memory_where_there_is_enough() {
-    let Some(mesh) = data::mesh("city/denhaag01_lod2_terrain.obj") else { return };
+    let Some(mesh) = town() else { return };
     let report = assert_same(&mesh, true, 1 << 30);
     assert!(report.roots < 10, "{report:?}");
 }
@@ -119,7 +128,7 @@ fn components_are_merged_as_in_memory_where_there_is_enough() {
 /// With less, they are merged once what is left fits.
 #[test]
 fn components_are_merged_within_little_memory() {
-    let Some(mesh) = data::mesh("city/denhaag01_lod2_terrain.obj") else { return };
+    let Some(mesh) = town() else { return };
     let (log, report) = build(&mesh, true, 4 << 20);
     assert!(report.windows > 10 && report.roots < 10, "{report:?}");
     check(&mesh, &log, &report);
@@ -206,7 +215,7 @@ fn failures_are_named() {
         let read = |receiver: &mut dyn Receiver, _: &mut dyn FnMut(u64, u64)| {
             send(&mesh, receiver)?;
             receiver
-                .position(position)
+                .position(position.map(f64::from))
                 .and_then(|()| receiver.triangle(triangle))
                 .map_err(MeshIoError::Receiver)
         };

@@ -6,19 +6,27 @@
 use std::io;
 
 use glam::Vec3;
-use vertex_tree::NONE;
 use vertex_tree::external::{Scratch, Sorter, Spool};
+use vertex_tree::{Georeference, NONE, Rounding};
 
-use super::super::edge_lengths::EdgeLengths;
 use super::super::is_flat;
 use super::super::spatial_order::Curve;
 use super::blocks::{Blocks, VERTEX_WORDS, Words};
+use crate::edge_lengths::EdgeLengths;
+use crate::mesh_io::{Bounds, Placing, exact};
 
 /// The input on disk, as it will be in the log.
 #[derive(Debug)]
 pub(super) struct Input {
+    /// Relative to the origin, once [`place`](Self::place) has been called.
     pub positions: Spool<3>,
     pub triangles: Spool<3>,
+    pub georeference: Georeference,
+    /// All positions in 64 bits, once 32 do not hold one of them exactly; then there are none in `positions`.
+    wide: Option<Spool<6>>,
+    scratch: Scratch,
+    /// Of the world coordinates.
+    bounds: Bounds,
     low: Vec3,
     high: Vec3,
     /// Of the edges, once the first blocks have been made.
@@ -30,16 +38,84 @@ impl Input {
         Ok(Input {
             positions: scratch.spool()?,
             triangles: scratch.spool()?,
+            georeference: Georeference::default(),
+            wide: None,
+            scratch: scratch.clone(),
+            bounds: Bounds::default(),
             low: Vec3::INFINITY,
             high: Vec3::NEG_INFINITY,
-            lengths: EdgeLengths::new(),
+            lengths: EdgeLengths::default(),
         })
     }
 
-    pub fn push_position(&mut self, position: [f32; 3]) -> io::Result<()> {
+    /// How many vertices there are.
+    pub fn vertices(&self) -> u64 {
+        self.wide.as_ref().map_or(self.positions.len(), Spool::len)
+    }
+
+    pub fn push_position(&mut self, position: [f64; 3]) -> io::Result<()> {
+        self.bounds.include(position);
+        if self.wide.is_none() {
+            if let Some(short) = exact(position) {
+                return self.push_placed(short);
+            }
+            let mut wide = self.scratch.spool()?;
+            for short in self.positions.read()? {
+                wide.push(to_words(short?.map(|x| f64::from(f32::from_bits(x)))))?;
+            }
+            self.forget_positions()?;
+            self.wide = Some(wide);
+        }
+        match &mut self.wide {
+            Some(wide) => wide.push(to_words(position)),
+            None => Ok(()),
+        }
+    }
+
+    pub fn position_of(&mut self, vertex: u32) -> io::Result<[f64; 3]> {
+        match &mut self.wide {
+            Some(wide) => Ok(from_words(wide.get(u64::from(vertex))?)),
+            None => Ok(self.positions.get(u64::from(vertex))?.map(|x| f64::from(f32::from_bits(x)))),
+        }
+    }
+
+    /// Once everything has been read: makes 32-bit positions about the middle, if 32 bits do not hold the world coordinates, as
+    /// the collector of `mesh_io` does in memory. `memory` is in bytes.
+    pub fn place(&mut self, memory: usize, mut check: impl FnMut() -> io::Result<()>) -> io::Result<()> {
+        let Some(mut wide) = self.wide.take() else { return Ok(()) };
+        let mut placing = Placing::new(&self.bounds);
+        for position in wide.read()? {
+            check()?;
+            self.push_placed(placing.place(from_words(position?)))?;
+        }
+        let mut edges = EdgeLengths::default();
+        if placing.largest_move > 0.0 {
+            let mut wide = wide.into_paged(memory)?;
+            for triangle in self.triangles.read()? {
+                check()?;
+                let mut corners = [[0.0; 3]; 3];
+                for (corner, vertex) in corners.iter_mut().zip(triangle?) {
+                    *corner = from_words(wide.get(u64::from(vertex))?);
+                }
+                edges.add(corners);
+            }
+        }
+        self.georeference.origin = placing.origin;
+        self.georeference.rounding =
+            Rounding { largest_move: placing.largest_move, median_edge: edges.median() };
+        Ok(())
+    }
+
+    fn push_placed(&mut self, position: [f32; 3]) -> io::Result<()> {
         let p = Vec3::from_array(position);
         (self.low, self.high) = (self.low.min(p), self.high.max(p));
         self.positions.push(position.map(f32::to_bits))
+    }
+
+    fn forget_positions(&mut self) -> io::Result<()> {
+        self.positions = self.scratch.spool()?;
+        (self.low, self.high) = (Vec3::INFINITY, Vec3::NEG_INFINITY);
+        Ok(())
     }
 
     /// Diagonal of the bounding box in object units.
@@ -82,10 +158,10 @@ pub(super) fn first_blocks(
 
     let mut by_lowest = Sorter::<5>::new(scratch, memory / 2);
     for (number, triangle) in (0_u32..).zip(input.triangles.read()?) {
-        let (mut corners, mut places) = ([0; 3], [Vec3::ZERO; 3]);
+        let (mut corners, mut places) = ([0; 3], [[0.0; 3]; 3]);
         for ((corner, place), old) in corners.iter_mut().zip(&mut places).zip(triangle?) {
             let [new, x, y, z] = numbers.get(u64::from(old))?;
-            (*corner, *place) = (new, Vec3::from_array([x, y, z].map(f32::from_bits)));
+            (*corner, *place) = (new, [x, y, z].map(|x| f64::from(f32::from_bits(x))));
         }
         let [a, b, c] = corners;
         if !is_flat(corners) {
@@ -133,4 +209,16 @@ pub(super) fn first_blocks(
     }
     blocks.finish_joining();
     Ok((blocks, id as usize))
+}
+
+/// Each coordinate in two words, the lower first.
+fn to_words(position: [f64; 3]) -> [u32; 6] {
+    let [x, y, z] = position.map(f64::to_bits);
+    [x as u32, (x >> 32) as u32, y as u32, (y >> 32) as u32, z as u32, (z >> 32) as u32]
+}
+
+fn from_words(words: [u32; 6]) -> [f64; 3] {
+    std::array::from_fn(|axis| {
+        f64::from_bits(u64::from(words[2 * axis + 1]) << 32 | u64::from(words[2 * axis]))
+    })
 }
