@@ -1,6 +1,8 @@
 //! Files of every version of every format: they open, and give what they were made of; and the last version is written, byte
 //! for byte, whatever the memory.
 
+mod unknown;
+
 use std::path::{Path, PathBuf};
 use std::sync::atomic::AtomicBool;
 
