@@ -115,7 +115,8 @@ impl ActiveMesh {
         self.changed_triangles.clear();
     }
 
-    /// A copy of the displayed mesh, without holes.
+    /// A copy of the displayed mesh, without holes. Where it lies in the world, nobody has told this one: the georeference is
+    /// the default.
     #[must_use]
     pub fn to_mesh(&self) -> Mesh {
         let mut number = vec![NONE; self.positions.len()];

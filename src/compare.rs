@@ -190,7 +190,7 @@ impl Subject {
             let mut engine =
                 Engine::new(open(opening)?, ActiveMesh::new(), settings).map_err(|e| self.tree_error(e))?;
             engine.advance(&[view]).map_err(|e| self.tree_error(e))?;
-            Ok(engine.mesh().to_mesh())
+            Ok(self.placed(engine.mesh()))
         })
     }
 
@@ -246,7 +246,12 @@ impl Subject {
             };
             unfold_all(&mut tree, &mut mesh, count).map_err(|e| self.tree_error(e))?;
         });
-        Ok(mesh.to_mesh())
+        Ok(self.placed(&mesh))
+    }
+
+    /// A copy of the displayed mesh at its place in the world.
+    fn placed(&self, displayed: &ActiveMesh) -> Mesh {
+        Mesh { georeference: self.store.georeference(), ..displayed.to_mesh() }
     }
 
     fn new_check(&self) -> Result<Check, CompareError> {

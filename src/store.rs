@@ -10,7 +10,8 @@ use meta_node::{MetaNodeError, MetaNodeFile};
 use mt_partition::{MtError, MtFile};
 use vertex_tree::source::{FileSource, PageSource};
 use vertex_tree::{
-    CollapseLog, LogError, LogFile, LogFileError, LogSource, read_log, write_log, write_log_from,
+    CollapseLog, Georeference, LogError, LogFile, LogFileError, LogSource, read_log, write_log,
+    write_log_from,
 };
 
 /// Where a hierarchy is kept.
@@ -205,7 +206,8 @@ pub fn write_within(
     let counts = log.counts();
     match backend {
         Backend::InMemory => {
-            write_log_from(file, counts, log.positions(), log.triangles(), log.collapses())?;
+            let (positions, triangles) = (log.positions(), log.triangles());
+            write_log_from(file, counts, log.georeference(), positions, triangles, log.collapses())?;
         }
         Backend::MetaNode => {
             let options = meta_node::BuildOptions { levels: options.levels, ..Default::default() };
@@ -306,6 +308,18 @@ impl Store {
             Self::DetailBlock(file) => file.facts(),
             Self::MtPartition(file) => file.facts(),
         }
+    }
+
+    /// Where the mesh lies in the world.
+    #[must_use]
+    pub fn georeference(&self) -> Georeference {
+        match self {
+            Self::InMemory(_, log) => &log.mesh.georeference,
+            Self::MetaNode(file) => file.georeference(),
+            Self::DetailBlock(file) => file.georeference(),
+            Self::MtPartition(file) => file.georeference(),
+        }
+        .clone()
     }
 
     /// Triangles of the input.

@@ -6,7 +6,7 @@ use std::sync::atomic::{AtomicBool, Ordering};
 
 use anyhow::{Context, Result};
 use serde_json::json;
-use vertex_tree::{CollapseLog, LogFile, read_log};
+use vertex_tree::{CollapseLog, DegreeMap, Georeference, LogFile, Mesh, log_file_version, read_log};
 
 use super::arguments::{Build, Info, Verify};
 use super::input::Input;
@@ -134,17 +134,17 @@ pub(super) fn info(command: &Info) -> Result<()> {
         let lines = facts.iter().map(|(name, value)| format!("{name:20} {value}\n"));
         return print(&lines.collect::<String>());
     }
-    let log = read_log(&command.file)?;
+    let (log, version) = (read_log(&command.file)?, log_file_version(&command.file)?);
     let bytes = std::fs::metadata(&command.file).with_context(|| command.file.display().to_string())?.len();
     let forest = log.forest()?;
     let roots = forest.roots().count();
     let largest = log.collapses.iter().map(|c| c.bounds.eps).fold(0.0, f32::max);
-    let (lo, hi) = log.mesh.bounding_box().unwrap_or_default();
+    let georeference = &log.mesh.georeference;
     let per_triangle = bytes as f64 / log.mesh.triangles.len().max(1) as f64;
     if command.json {
-        let value = json!({
+        let mut value = json!({
             "format": "collapse log",
-            "version": 1,
+            "version": version,
             "bytes": bytes,
             "bytes_per_triangle": per_triangle,
             "vertices": log.mesh.positions.len(),
@@ -154,15 +154,28 @@ pub(super) fn info(command: &Info) -> Result<()> {
             "depth": forest.depth(),
             "base_triangles": base_triangles(&log),
             "largest_error": largest,
-            "bounding_box": [lo, hi],
+            "bounding_box": world_box(&log.mesh),
         });
+        if *georeference != Georeference::default() {
+            value["origin"] = json!(georeference.origin);
+            value["coordinate_system"] = json!(georeference.coordinate_system);
+            value["largest_move"] = json!(georeference.rounding.largest_move);
+            value["median_edge"] = json!(georeference.rounding.median_edge);
+        }
+        if let Some(DegreeMap { longitude, latitude, metres_per_degree }) = georeference.degrees {
+            value["degrees"] = json!({
+                "longitude": longitude,
+                "latitude": latitude,
+                "metres_per_degree": metres_per_degree,
+            });
+        }
         return print(&format!("{value:#}\n"));
     }
     let mut text = String::new();
     let mut line = |name: &str, value: String| {
         let _ = writeln!(text, "{name:20} {value}");
     };
-    line("format", "collapse log, version 1 (backend in-memory)".to_owned());
+    line("format", format!("collapse log, version {version} (backend in-memory)"));
     line("bytes", format!("{bytes} ({per_triangle:.1} a triangle)"));
     line("vertices", log.mesh.positions.len().to_string());
     line("triangles", log.mesh.triangles.len().to_string());
@@ -171,8 +184,25 @@ pub(super) fn info(command: &Info) -> Result<()> {
     line("depth", forest.depth().to_string());
     line("base triangles", base_triangles(&log).to_string());
     line("largest error", largest.to_string());
+    let [lo, hi] = world_box(&log.mesh);
     line("bounding box", format!("{lo:?} {hi:?}"));
+    for (name, value) in georeference.facts() {
+        line(name, value);
+    }
     print(&text)
+}
+
+/// The corners of the bounding box in world coordinates. Those of an f32 alone are shown with no more digits than it has.
+fn world_box(mesh: &Mesh) -> [[f64; 3]; 2] {
+    let (lo, hi) = mesh.bounding_box().unwrap_or_default();
+    let world = |corner: [f32; 3]| {
+        let placed = mesh.georeference.world(corner);
+        std::array::from_fn(|axis| {
+            let own = corner[axis].to_string().parse();
+            if mesh.georeference.origin[axis] == 0.0 { own.unwrap_or(placed[axis]) } else { placed[axis] }
+        })
+    };
+    [world(lo), world(hi)]
 }
 
 fn base_triangles(log: &CollapseLog) -> usize {

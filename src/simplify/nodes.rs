@@ -47,6 +47,8 @@ pub(super) struct Nodes {
     pub ids: Option<Vec<u32>>,
     /// The number in the whole construction that the next node gets.
     pub next_id: u32,
+    /// The number in the whole construction of the round's first node.
+    pub first_of_round: u32,
     /// For each node, the number of edges on the longest way down to a leaf.
     pub height: Vec<u32>,
     /// For each node, the length of the longest chain of predecessors down to the input, counting itself.
@@ -70,6 +72,7 @@ impl Nodes {
             keys: Vec::with_capacity(leaf_radius.len()),
             ids: None,
             next_id: 0,
+            first_of_round: 0,
             height: Vec::with_capacity(leaf_radius.len()),
             depth: Vec::with_capacity(leaf_radius.len()),
             top: vec![NONE; leaf_radius.len()],
@@ -98,9 +101,9 @@ impl Nodes {
 
     /// Makes the node of a collapse, unless its sphere is too large for single precision, and says whether it has.
     /// `creators` are the collapses that last changed the triangles around `removed`, `NONE` for untouched ones;
-    /// `bereaved` are the vertices that lose a triangle and get none; `positions` are those of the two vertices. The round's
-    /// first node has the number `first` in the whole construction: where the collapse depends on another of the round, its
-    /// key is no less than that one's, so that the order of keys is one in which they can be made.
+    /// `bereaved` are the vertices that lose a triangle and get none; `positions` are those of the two vertices. Where the
+    /// collapse depends on another of the round, its key is no less than that one's, so that the order of keys is one in which
+    /// they can be made.
     pub fn add(
         &mut self,
         [removed, kept]: [u32; 2],
@@ -109,7 +112,6 @@ impl Nodes {
         bereaved: &[u32],
         error: f32,
         key: f32,
-        first: u32,
     ) -> bool {
         self.predecessors.clear();
         self.balls.clear();
@@ -138,7 +140,7 @@ impl Nodes {
             self.balls.push(Ball { center: b.center.map(f64::from).into(), radius: f64::from(b.radius) });
             eps = eps.max(b.eps);
             depth = depth.max(self.depth[node as usize]);
-            if self.is_from(node, first) {
+            if self.is_from(node, self.first_of_round) {
                 key = key.max(self.keys[node as usize]);
             }
         }

@@ -47,7 +47,9 @@ use std::sync::atomic::AtomicBool;
 use std::time::Instant;
 
 use vertex_tree::external::Scratch;
-use vertex_tree::{Bounds, Collapse, DegreeMap, LogCounts, LogError, LogFileError, NONE, write_log_from};
+use vertex_tree::{
+    Bounds, Collapse, DegreeMap, Georeference, LogCounts, LogError, LogFileError, NONE, write_log_from,
+};
 
 use super::key_counts::KeyCounts;
 use super::{Options, Report};
@@ -213,9 +215,11 @@ pub fn build_within(
     let (log, base_triangles) = (&mut passes.log, passes.whole.live_triangles);
     let collapses = log.collapses.len();
     let counts = LogCounts { vertices, triangles, collapses };
-    write(output, counts, &mut input, log, limits.stop).map_err(|error| match error {
-        LogFileError::Io { source, .. } if is_interruption(&source) => OutOfCoreError::Interrupted,
-        error => error.into(),
+    write(output, counts, &input.georeference.clone(), &mut input, log, limits.stop).map_err(|error| {
+        match error {
+            LogFileError::Io { source, .. } if is_interruption(&source) => OutOfCoreError::Interrupted,
+            error => error.into(),
+        }
     })?;
     progress(1000, 1000);
     Ok(Report {
@@ -242,6 +246,7 @@ pub fn build_within(
 fn write(
     output: &Path,
     counts: LogCounts,
+    georeference: &Georeference,
     input: &mut Input,
     log: &mut Log,
     stop: &AtomicBool,
@@ -256,7 +261,7 @@ fn write(
         passes::check(stop)?;
         Ok(Collapse { removed, kept, bounds: Bounds { center, radius, eps } })
     });
-    write_log_from(output, counts, positions, triangles, collapses)
+    write_log_from(output, counts, georeference, positions, triangles, collapses)
 }
 
 /// Bytes of temporary files a triangle at the worst moment. The most is needed in the first passes: the input, and all

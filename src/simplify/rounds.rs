@@ -194,6 +194,7 @@ impl Builder {
     /// the round.
     pub fn run_block(&mut self, limit: f32, first: u32, range: Range<usize>) {
         self.order.clear();
+        self.nodes.first_of_round = first;
         for i in range {
             let v = self.surface.live[i];
             self.candidates.visit(v, &mut self.surface, &mut self.marks);
@@ -297,7 +298,7 @@ impl Builder {
             }
             return;
         }
-        self.collapse(v, u, error, first);
+        self.collapse(v, u, error);
     }
 
     /// Whether another collapse may change the star of `v` in a round in which one has: where `v` is a hub that has only lost
@@ -322,16 +323,16 @@ impl Builder {
         }
     }
 
-    /// Merges `v`, whose star is in `self.star`, into `u`, which has just been measured. The round's first node is given.
-    fn collapse(&mut self, v: u32, u: u32, error: f64, first: u32) {
+    /// Merges `v`, whose star is in `self.star`, into `u`, which has just been measured.
+    fn collapse(&mut self, v: u32, u: u32, error: f64) {
         let surface = &mut self.surface;
         let (from, to) = (surface.position(v), surface.position(u));
         let node = self.nodes.next();
         let creators = self.star.iter().map(|s| surface.triangles[s.triangle as usize].creator);
         let key = self.candidates.key[v as usize];
-        let positions = [from, to].map(|p| p.as_dvec3());
+        let positions = [from.as_dvec3(), to.as_dvec3()];
         let eps = round_up(error);
-        if !self.nodes.add([v, u], positions, creators, &self.bereaved, eps, key, first) {
+        if !self.nodes.add([v, u], positions, creators, &self.bereaved, eps, key) {
             self.candidates.give_up(v);
             return;
         }

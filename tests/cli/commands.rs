@@ -29,7 +29,8 @@ fn a_hierarchy_is_built_described_and_verified() {
 
     let info = place.succeed("info grid.log");
     let bytes = place.read("grid.log").len();
-    assert_eq!(bytes, 44 + 12 * 144 + 12 * 242 + 28 * collapses + 12);
+    // Header, table of three sections, and these.
+    assert_eq!(bytes, 48 + 8 + 3 * 32 + 12 * 144 + 12 * 242 + 28 * collapses);
     for (label, value) in [("bytes", bytes), ("vertices", 144), ("triangles", 242), ("collapses", collapses)]
     {
         assert_eq!(figure(&info, label), value as f64, "{label}");
@@ -39,7 +40,7 @@ fn a_hierarchy_is_built_described_and_verified() {
     let roots = 144 - collapses as u64 - lone_vertices(&log);
     for (key, value) in [
         ("bytes", bytes as u64),
-        ("version", 1),
+        ("version", 2),
         ("vertices", 144),
         ("triangles", 242),
         ("collapses", collapses as u64),
@@ -54,6 +55,53 @@ fn a_hierarchy_is_built_described_and_verified() {
 
     let verified = place.succeed("verify grid.log");
     assert_eq!(verified, format!("grid.log: {collapses} collapses, all in order\n"));
+}
+
+/// A mesh that is somewhere in the world stays there in every format, and `info` says where.
+#[test]
+fn info_says_where_a_mesh_lies_in_the_world() {
+    let place = Workplace::new();
+    place.succeed("build grid.ply -o grid.log");
+    assert!(!place.succeed("info grid.log").contains("origin"));
+    let mut log = vertex_tree::read_log(&place.file("grid.log")).unwrap();
+    log.mesh.georeference = vertex_tree::Georeference {
+        origin: [691_000.5, 5_334_000.0, 0.0],
+        coordinate_system: "EPSG:25832".to_owned(),
+        rounding: vertex_tree::Rounding { largest_move: 0.125, median_edge: 2.5 },
+        ..Default::default()
+    };
+    vertex_tree::write_log(&place.file("there.log"), &log).unwrap();
+    let lines = [
+        "origin 691000.5 5334000 0",
+        "coordinate system EPSG:25832",
+        "largest move 0.125",
+        "median edge 2.5",
+    ];
+    for (backend, version) in [
+        ("in-memory", "collapse log, version 2"),
+        ("meta-node", "meta-nodes, version 2"),
+        ("detail-block", "XFM version 2"),
+        ("mt-partition", "multi-triangulation, version 2"),
+    ] {
+        place.succeed(&format!("build there.log --backend {backend} -o there"));
+        let info = place.succeed("info there");
+        let words: Vec<String> =
+            info.lines().map(|line| line.split_whitespace().collect::<Vec<_>>().join(" ")).collect();
+        for line in lines {
+            assert!(words.iter().any(|words| words == line), "{backend}: {line}: {info}");
+        }
+        assert!(info.contains(version), "{info}");
+        let json: Value = serde_json::from_str(&place.succeed("info there --json")).unwrap();
+        assert_eq!(json["coordinate_system"], "EPSG:25832", "{backend}");
+        for key in ["origin", "largest_move", "median_edge"] {
+            assert!(!json[key].is_null(), "{backend}: {key}");
+        }
+    }
+    let json: Value = serde_json::from_str(&place.succeed("info there.log --json")).unwrap();
+    assert_eq!(json["origin"], Value::from(vec![691_000.5, 5_334_000.0, 0.0]));
+    assert_eq!(json["bounding_box"][0], Value::from(vec![690_999.5, 5_333_999.0, 0.0]));
+    assert_eq!([&json["largest_move"], &json["median_edge"]], [0.125, 2.5]);
+    assert!(place.succeed("info there.log").contains("[690999.5, 5333999.0, 0.0]"));
 }
 
 /// Vertices that no collapse touches.

@@ -208,8 +208,10 @@ fn a_damaged_hierarchy_is_named_with_the_offset() {
     place.succeed("build grid.ply -o grid.log");
     let whole = place.read("grid.log");
     let (vertices, triangles) = (144, 242);
-    let triangles_at = 44 + 12 * vertices;
-    let collapses_at = triangles_at + 12 * triangles;
+    let table_at: usize = 48;
+    let positions_at = table_at + 8 + 3 * 32;
+    let triangles_at = positions_at + 12 * vertices;
+    let collapses_at = (triangles_at + 12 * triangles).next_multiple_of(8);
     let flipped = |at: usize| {
         let mut bytes = whole.clone();
         bytes[at] ^= 0x10;
@@ -218,7 +220,8 @@ fn a_damaged_hierarchy_is_named_with_the_offset() {
     place.write("magic.log", flipped(3));
     place.write("version.log", flipped(8));
     place.write("counts.log", flipped(17));
-    place.write("positions.log", flipped(44 + 30));
+    place.write("table.log", flipped(table_at + 20));
+    place.write("positions.log", flipped(positions_at + 30));
     place.write("triangles.log", flipped(triangles_at + 30));
     place.write("collapses.log", flipped(collapses_at + 30));
     place.write("end.log", flipped(whole.len() - 1));
@@ -229,7 +232,8 @@ fn a_damaged_hierarchy_is_named_with_the_offset() {
     let cases = [
         ("version.log", offset(8)),
         ("counts.log", offset(0)),
-        ("positions.log", offset(44)),
+        ("table.log", offset(table_at)),
+        ("positions.log", offset(positions_at)),
         ("triangles.log", offset(triangles_at)),
         ("collapses.log", offset(collapses_at)),
         ("end.log", offset(collapses_at)),

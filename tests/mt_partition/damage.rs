@@ -107,7 +107,7 @@ fn huge_counts_are_refused() {
 fn something_else_is_refused() {
     let error = open(b"FFCOLLOG and so on".to_vec()).unwrap_err();
     assert!(matches!(error, MtError::NotThis { .. }), "{error}");
-    for (offset, message) in [(8, "version 2"), (12, "attribute stride 1")] {
+    for (offset, message) in [(8, "version 3"), (12, "attribute stride 1")] {
         let mut other = small();
         other[offset] += 1;
         let error = open(other).unwrap_err();

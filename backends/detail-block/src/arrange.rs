@@ -2,11 +2,11 @@
 
 use std::io;
 
-use vertex_tree::{LogSource, NONE};
+use vertex_tree::{Georeference, LogSource, NONE};
 
 use crate::build::{BuildOptions, WriteReport};
 use crate::error::{Failure, XfmError};
-use crate::format::{Header, OFFSET_BITS};
+use crate::format::{Header, OFFSET_BITS, VERSION};
 use crate::half_edges::{BOUNDARY, HalfEdge, triangle_of};
 use crate::layout::Layout;
 use crate::nesting::{Nesting, Node};
@@ -16,6 +16,7 @@ use crate::renumber::Renumbered;
 use crate::replay::{Merge, Replay, Replayed};
 use crate::storage::{Elements, Storage};
 use crate::surface::{Leaf, Surface};
+use crate::writing;
 
 /// A log arranged for an XFM file.
 pub(crate) struct Arranged<S: Storage> {
@@ -30,6 +31,7 @@ pub(crate) struct Arranged<S: Storage> {
     /// For each triangle, the file's number of the half-edge that is number 0 there, with its number here in the last two
     /// bits.
     pub triangles: S::Array<u32>,
+    pub georeference: Georeference,
 }
 
 impl<S: Storage> Arranged<S> {
@@ -48,6 +50,7 @@ impl<S: Storage> Arranged<S> {
         let mut nesting = Nesting::new(&surface, options.quantize, options.nest_needs, storage);
         let Replayed { mut merges, left_out } = Replay::run(&mut surface, &mut nesting, storage)?;
         let mut header = Header {
+            version: VERSION,
             levels,
             quantised: options.quantize,
             nested: options.nest_needs,
@@ -89,16 +92,18 @@ impl<S: Storage> Arranged<S> {
         }
         header.roots = layout.roots.len() as u64;
         header.blocks = layout.blocks;
-        header.length = header.sections()[4]
-            + layout.leaf_blocks * header.block_bytes(0, true)
+        let georeference = log.georeference().clone();
+        let blocks = layout.leaf_blocks * header.block_bytes(0, true)
             + (layout.blocks - layout.leaf_blocks) * header.block_bytes(0, false)
             + header.nodes * header.node_bytes() as u64;
+        header.length = writing::length(&header, blocks, &georeference).map_err(Failure::Output)?;
         let most = 1 << OFFSET_BITS;
         if header.length > most {
             return Err(XfmError::TooLarge { what: "bytes", count: header.length, most }.into());
         }
         let (nodes, initial_vertices, initial_faces) = (nesting.nodes, vertices, faces);
-        Ok(Self { header, merges, nodes, layout, initial_vertices, initial_faces, triangles: numbers })
+        let triangles = numbers;
+        Ok(Self { header, merges, nodes, layout, initial_vertices, initial_faces, triangles, georeference })
     }
 
     /// The file's number of a half-edge.

@@ -4,6 +4,7 @@ use std::io;
 use std::path::{Path, PathBuf};
 
 use vertex_tree::LogError;
+use vertex_tree::sections::SectionError;
 
 /// An XFM file could not be written or is not what it should be.
 #[derive(Debug, thiserror::Error)]
@@ -113,6 +114,14 @@ pub enum XfmError {
         /// Its name.
         section: &'static str,
     },
+    /// The sections of the file are not what they should be.
+    #[error("{file}: {source}")]
+    Sections {
+        /// The file or store.
+        file: String,
+        /// What is wrong with them.
+        source: SectionError,
+    },
     /// A detail block does not hold what it should, though it may be intact.
     #[error("{file}: offset {offset}: block {block} is damaged: {reason}")]
     Block {
@@ -137,6 +146,18 @@ pub enum XfmError {
         /// What is wrong with it.
         reason: &'static str,
     },
+}
+
+impl XfmError {
+    /// What is wrong with the sections of a file, under the name that it has always had.
+    pub(crate) fn of_sections(file: &str, error: SectionError) -> Self {
+        let file = file.to_owned();
+        match error {
+            SectionError::Io { offset, length, source } => Self::Read { file, offset, length, source },
+            SectionError::FileLength { expected, actual } => Self::FileLength { file, expected, actual },
+            source => Self::Sections { file, source },
+        }
+    }
 }
 
 /// What goes wrong in a construction, before it is known what is called how.

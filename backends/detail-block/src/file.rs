@@ -3,15 +3,17 @@
 use std::path::Path;
 use std::sync::Arc;
 
+use vertex_tree::sections::Sections;
 use vertex_tree::source::{FileSource, MappedSource, PageSource};
-use vertex_tree::{Bounds, NodeId};
+use vertex_tree::{Bounds, Georeference, NodeId};
 
 use crate::block::{Block, resident_bytes};
 use crate::error::XfmError;
-use crate::format::{ENTRY_BYTES, Header, OFFSET_BITS, RECORD_BYTES, VERSION};
+use crate::format::{ENTRY_BYTES, Header, OFFSET_BITS, RECORD_BYTES};
 use crate::half_edges::{BOUNDARY, HalfEdges, Triangle, next};
-use crate::header::{long, read_header, read_section};
+use crate::header::{long, read_header};
 use crate::numbering::{Levels, Owner, owner};
+use crate::tables::Tables;
 
 /// Where blocks are: the block index, in memory or in the mapped file (section 3.3).
 enum Index {
@@ -45,6 +47,8 @@ pub struct XfmFile {
     initial_vertices: Vec<[[f32; 3]; 2]>,
     /// Their reverses are slots, as initial faces come first in those of the displayed mesh.
     initial_faces: HalfEdges,
+    georeference: Georeference,
+    sections: Sections,
 }
 
 impl XfmFile {
@@ -69,12 +73,9 @@ impl XfmFile {
 
     fn with_index(source: Arc<dyn PageSource>, map: Option<MappedSource>) -> Result<Self, XfmError> {
         let header = read_header(&*source)?;
-        let [vertices_at, faces_at, roots_at, index_at, blocks_at] = header.sections();
-        let words = |at, count, section| read_section(&*source, at, count * RECORD_BYTES, section);
-        let vertices = words(vertices_at, header.initial_vertices, "initial vertices")?;
-        let faces = words(faces_at, header.initial_faces, "initial faces")?;
-        let roots = words(roots_at, header.roots, "root list")?;
-        let index = read_section(&*source, index_at, header.blocks * ENTRY_BYTES, "block index")?;
+        let Tables { at, bytes, blocks, georeference, sections } = Tables::read(&*source, &header)?;
+        let [vertices_at, faces_at, roots_at, index_at] = at;
+        let [vertices, faces, roots, index] = bytes;
         let mut file = Self {
             index: Index::Loaded(index.chunks_exact(8).map(long).collect()),
             source,
@@ -83,6 +84,8 @@ impl XfmFile {
             roots: Vec::with_capacity(header.roots as usize),
             initial_vertices: records(&vertices).map(positions).collect(),
             initial_faces: HalfEdges::default(),
+            georeference,
+            sections,
         };
         if let Some(i) = file.initial_vertices.iter().flatten().flatten().position(|x| !x.is_finite()) {
             let offset = vertices_at + 4 * i as u64;
@@ -90,7 +93,7 @@ impl XfmFile {
         }
         file.check_faces(&faces, faces_at)?;
         file.check_roots(&roots, roots_at)?;
-        file.check_index(index_at, blocks_at)?;
+        file.check_index(index_at, blocks)?;
         if let Some(map) = map {
             file.index = Index::Mapped(map, index_at as usize);
         }
@@ -166,7 +169,7 @@ impl XfmFile {
         Ok(())
     }
 
-    fn check_index(&mut self, index_at: u64, blocks_at: u64) -> Result<(), XfmError> {
+    fn check_index(&mut self, index_at: u64, (blocks_at, blocks_end): (u64, u64)) -> Result<(), XfmError> {
         let (mut at, mut nodes) = (blocks_at, 0_u64);
         for block in 0..self.header.blocks as u32 {
             let entry = self.index.entry(block);
@@ -187,8 +190,8 @@ impl XfmFile {
             at += length;
             nodes += u64::from(count);
         }
-        if at != self.header.length {
-            return Err(self.field(136, "the length", self.header.length, "but blocks end elsewhere"));
+        if at != blocks_end {
+            return Err(self.field(48, "the number of blocks", self.header.blocks, "but they end elsewhere"));
         }
         if nodes != self.header.nodes {
             return Err(self.field(56, "the number of nodes", self.header.nodes, "but blocks have others"));
@@ -204,6 +207,18 @@ impl XfmFile {
     #[must_use]
     pub fn name(&self) -> &str {
         self.source.name()
+    }
+
+    /// Where the mesh lies in the world.
+    #[must_use]
+    pub fn georeference(&self) -> &Georeference {
+        &self.georeference
+    }
+
+    /// Compares the checksums of what this version does not know.
+    pub(crate) fn verify_unknown(&self) -> Result<(), XfmError> {
+        let error = |error| XfmError::of_sections(self.name(), error);
+        self.sections.verify_unknown(&*self.source).map_err(error)
     }
 
     pub(crate) fn header(&self) -> &Header {
@@ -285,8 +300,8 @@ impl XfmFile {
         let leaves =
             (0..h.blocks as u32).filter(|&b| h.nodes_of(self.place(b).1).is_some_and(|(_, leaf)| leaf));
         let fill = if h.blocks == 0 { 0.0 } else { h.nodes as f64 / h.blocks as f64 };
-        vec![
-            ("format", format!("XFM version {VERSION}, detail blocks (XFastMesh)")),
+        let mut facts = vec![
+            ("format", format!("XFM version {}, detail blocks (XFastMesh)", h.version)),
             ("node bytes", h.node_bytes().to_string()),
             ("quantised", if h.quantised { "yes" } else { "no" }.to_owned()),
             ("bounds nested over w x y z", if h.nested { "yes" } else { "no" }.to_owned()),
@@ -306,7 +321,9 @@ impl XfmFile {
             ("nodes a block", format!("{fill:.2}")),
             ("bytes", h.length.to_string()),
             ("bytes a triangle", format!("{per_triangle:.2}")),
-        ]
+        ];
+        facts.extend(self.georeference.facts());
+        facts
     }
 }
 

@@ -3,8 +3,8 @@
 //! ```text
 //! offset  bytes  field
 //!      0      8  magic "FFXFMESH"
-//!      8      4  version, 1
-//!     12      4  attribute stride: bytes of further vertex attributes, 0 in version 1
+//!      8      4  version, 2
+//!     12      4  attribute stride: bytes of further vertex attributes, 0
 //!     16      4  l, levels of a block, 1 to 5
 //!     20      4  flags: 1 nodes are quantised, 2 bounds are nested over w x y z too; others 0
 //!     24      8  V, initial vertices
@@ -24,16 +24,19 @@
 //!    132      4  reserved, 0
 //!    136      8  length of the file
 //!    144      4  CRC-32 of bytes 0 to 143
-//!    148   24 V  initial vertices: position and normal, 3 f32 each
-//!             4  CRC-32 of those
-//!          24 F  initial faces: three initial vertices, and the reverses of the half-edges that start there
-//!             4  CRC-32 of those
-//!          24 R  root list: number of the node, and its sphere and error as 5 f32, so that the blocks of roots can be paged
-//!             4  CRC-32 of those
-//!           8 B  block index: offset of the block in the low 48 bits, its length in the high 16
-//!             4  CRC-32 of those
-//!                detail blocks, in the order of their numbers, nothing between them
+//!    148      4  zeros
+//!    152         table of sections, see `vertex_tree::sections`:
+//!                GEOR  where the mesh lies in the world, if that is to be said
+//!                BASV  24 V, initial vertices: position and normal, 3 f32 each
+//!                BAST  24 F, initial faces: three initial vertices, and the reverses of the half-edges that start there
+//!                ROOT  24 R, root list: number of the node, and its sphere and error as 5 f32, so that the blocks of roots
+//!                      can be paged
+//!                PAGE  detail blocks, in the order of their numbers, nothing between them
+//!                PAGT  8 B, block index: offset of the block in the low 48 bits, its length in the high 16
 //! ```
+//!
+//! Version 1, which is read too, has no table of sections: the header is followed by initial vertices, initial faces, root
+//! list and block index, each with a CRC-32 behind it, and the blocks, with nothing between them.
 //!
 //! A detail block, with flag sets of `s = max(1, 2^l / 8)` bytes:
 //!
@@ -57,12 +60,13 @@ use crate::quantize::Scale;
 
 /// The first bytes of an XFM file.
 pub const MAGIC: [u8; 8] = *b"FFXFMESH";
-/// The version that is written and read.
-pub(crate) const VERSION: u32 = 1;
+/// The version that is written. The first is read too.
+pub(crate) const VERSION: u32 = 2;
 pub(crate) const HEADER_BYTES: u64 = 148;
 /// Bytes of an initial vertex, an initial face, a root.
 pub(crate) const RECORD_BYTES: u64 = 24;
 pub(crate) const ENTRY_BYTES: u64 = 8;
+/// Behind each block, and in version 1 behind everything else.
 pub(crate) const SUM_BYTES: u64 = 4;
 pub(crate) const FLAG_QUANTISED: u32 = 1;
 pub(crate) const FLAG_NESTED: u32 = 2;
@@ -72,6 +76,8 @@ pub(crate) const OFFSET_BITS: u32 = 48;
 /// The header.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) struct Header {
+    /// As read; what is written is [`VERSION`].
+    pub version: u32,
     pub levels: Levels,
     pub quantised: bool,
     /// Whether bounds are nested over w x y z.
@@ -101,16 +107,11 @@ impl Header {
         if self.quantised { crate::node::QUANTISED_BYTES } else { crate::node::PLAIN_BYTES }
     }
 
-    /// Where initial vertices, initial faces, root list, block index and blocks start.
-    pub fn sections(&self) -> [u64; 5] {
-        let mut at = HEADER_BYTES;
-        let records = [self.initial_vertices, self.initial_faces, self.roots].map(|n| n * RECORD_BYTES);
-        let starts = records.map(|bytes| {
-            let start = at;
-            at += bytes + SUM_BYTES;
-            start
-        });
-        [starts[0], starts[1], starts[2], at, at + self.blocks * ENTRY_BYTES + SUM_BYTES]
+    /// Bytes of initial vertices, initial faces, root list and block index.
+    pub fn table_bytes(&self) -> [u64; 4] {
+        let [vertices, faces, roots] =
+            [self.initial_vertices, self.initial_faces, self.roots].map(|n| n * RECORD_BYTES);
+        [vertices, faces, roots, self.blocks * ENTRY_BYTES]
     }
 
     /// Bytes of a block of so many nodes.

@@ -1,9 +1,9 @@
-//! Reading the header and the sections before the blocks, each with its checksum.
+//! Reading the header.
 
 use vertex_tree::source::PageSource;
 
 use crate::error::XfmError;
-use crate::format::{FLAG_NESTED, FLAG_QUANTISED, HEADER_BYTES, Header, MAGIC, SUM_BYTES, VERSION};
+use crate::format::{FLAG_NESTED, FLAG_QUANTISED, HEADER_BYTES, Header, MAGIC, VERSION};
 use crate::numbering::{Levels, MOST_FACES, MOST_NODES};
 use crate::quantize::Scale;
 
@@ -12,7 +12,7 @@ pub(crate) fn long(bytes: &[u8]) -> u64 {
     bytes.iter().rev().fold(0, |value, &byte| value << 8 | u64::from(byte))
 }
 
-fn read(source: &dyn PageSource, offset: u64, bytes: &mut [u8]) -> Result<(), XfmError> {
+pub(crate) fn read(source: &dyn PageSource, offset: u64, bytes: &mut [u8]) -> Result<(), XfmError> {
     let length = bytes.len() as u64;
     source.read_at(offset, bytes).map_err(|e| XfmError::Read {
         file: source.name().to_owned(),
@@ -22,23 +22,7 @@ fn read(source: &dyn PageSource, offset: u64, bytes: &mut [u8]) -> Result<(), Xf
     })
 }
 
-/// Reads a section and checks its sum. That it lies within the file has been checked with the header.
-pub(crate) fn read_section(
-    source: &dyn PageSource,
-    offset: u64,
-    length: u64,
-    section: &'static str,
-) -> Result<Vec<u8>, XfmError> {
-    let mut bytes = vec![0; (length + SUM_BYTES) as usize];
-    read(source, offset, &mut bytes)?;
-    let sum = bytes.split_off(length as usize);
-    if u64::from(crc32fast::hash(&bytes)) != long(&sum) {
-        return Err(XfmError::Checksum { file: source.name().to_owned(), offset, section });
-    }
-    Ok(bytes)
-}
-
-/// Reads the header and checks that everything it counts has its place in the file.
+/// Reads the header and checks its numbers. Whether what they count has its place in the file is found with the tables.
 pub(crate) fn read_header(source: &dyn PageSource) -> Result<Header, XfmError> {
     let file = || source.name().to_owned();
     let actual = source.len();
@@ -55,8 +39,8 @@ pub(crate) fn read_header(source: &dyn PageSource) -> Result<Header, XfmError> {
     let field = |offset: u64, field, value, expected| {
         Err(XfmError::Field { file: file(), offset, field, value, expected })
     };
-    if word(8) != VERSION {
-        return field(8, "the version", word(8).into(), "expected 1");
+    if !(1..=VERSION).contains(&word(8)) {
+        return field(8, "the version", word(8).into(), "expected 1 or 2");
     }
     if crc32fast::hash(&bytes[..144]) != word(144) {
         return Err(XfmError::Checksum { file: file(), offset: 0, section: "header" });
@@ -94,6 +78,7 @@ pub(crate) fn read_header(source: &dyn PageSource) -> Result<Header, XfmError> {
         return field(112, "the quantisation", scale.base.into(), "expected finite numbers");
     }
     let header = Header {
+        version: word(8),
         levels,
         quantised: flags & FLAG_QUANTISED != 0,
         nested: flags & FLAG_NESTED != 0,
@@ -111,11 +96,8 @@ pub(crate) fn read_header(source: &dyn PageSource) -> Result<Header, XfmError> {
         scale,
         length: count(136),
     };
-    // Every block has one node at least, so what is allocated next is no more than the file's own size.
-    let least = header.sections()[4] + header.blocks * header.block_bytes(1, true);
-    if header.length != actual || actual < least {
-        let expected = header.length.max(least);
-        return Err(XfmError::FileLength { file: file(), expected, actual });
+    if header.length != actual {
+        return Err(XfmError::FileLength { file: file(), expected: header.length, actual });
     }
     Ok(header)
 }

@@ -50,6 +50,7 @@ mod settings;
 mod shown;
 mod storage;
 mod surface;
+mod tables;
 mod tree;
 mod vector;
 mod verify;

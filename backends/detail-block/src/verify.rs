@@ -28,6 +28,7 @@ impl XfmFile {
     /// # Errors
     /// The first thing that is wrong.
     pub fn verify(&self) -> Result<(), XfmError> {
+        self.verify_unknown()?;
         let header = self.header();
         let (levels, nodes) = (header.levels, header.nodes as usize);
         let mut kept = Kept {

@@ -1,17 +1,17 @@
 //! Writing an XFM file: steps 3 and 5 to 7 of the paper's construction.
 //!
-//! Blocks are written in order, so nodes are sorted by their numbers. The index, whose place is before them, follows when all
-//! of their lengths are known.
+//! Blocks are written in order, so nodes are sorted by their numbers. The index follows, when all of their lengths are known.
 
-use std::io::{self, BufWriter, Seek, SeekFrom, Write};
+use std::io::{self, Seek, Write};
 use std::path::Path;
 
-use vertex_tree::{NONE, NodeId, output};
+use vertex_tree::sections::{self, BY_PAGE, Kind, SectionWriter};
+use vertex_tree::{Georeference, NONE, NodeId, output};
 
 use crate::arrange::Arranged;
 use crate::build::WriteReport;
 use crate::error::Failure;
-use crate::format::{OFFSET_BITS, block_sum};
+use crate::format::{HEADER_BYTES, Header, OFFSET_BITS, block_sum};
 use crate::node::Stored;
 use crate::storage::{Elements, Storage};
 
@@ -20,12 +20,10 @@ impl<S: Storage> Arranged<S> {
     pub fn write(&mut self, path: &Path, storage: &S) -> Result<WriteReport, Failure> {
         let mut failed = None;
         output::write_with(path, |file| {
-            let mut out = BufWriter::with_capacity(1 << 20, file);
-            if let Err(failure) = self.write_to(&mut out, storage) {
+            self.write_to(file, storage).map_err(|failure| {
                 failed = Some(failure);
-                return Err(io::ErrorKind::Other.into());
-            }
-            out.flush()
+                io::ErrorKind::Other.into()
+            })
         })
         .map_err(|source| failed.unwrap_or(Failure::Output(source)))?;
         Ok(self.report())
@@ -33,40 +31,41 @@ impl<S: Storage> Arranged<S> {
 
     /// Writes what the file holds.
     pub fn write_to(&mut self, out: &mut (impl Write + Seek), storage: &S) -> Result<(), Failure> {
-        let [_, _, _, index_at, blocks_at] = self.header.sections();
-        out.write_all(&self.header.encode()).map_err(Failure::Output)?;
-        let mut section = Section::new(out);
+        let output = Failure::Output;
+        let mut out =
+            SectionWriter::new(out, HEADER_BYTES, &self.georeference, &[], &KINDS).map_err(output)?;
+        out.begin(Kind::BASE_VERTICES).map_err(output)?;
         for v in 0..self.initial_vertices.len() {
-            section.put(&self.initial_vertices.get(v)?)?;
+            put(&mut out, &self.initial_vertices.get(v)?)?;
         }
-        section.end()?;
+        out.begin(Kind::BASE_TRIANGLES).map_err(output)?;
         for t in 0..self.initial_faces.len() {
             let [a, b, c, reverses @ ..] = self.initial_faces.get(t)?;
-            section.put(&[a, b, c])?;
+            put(&mut out, &[a, b, c])?;
             for h in reverses {
-                section.put(&[self.number(h)?])?;
+                put(&mut out, &[self.number(h)?])?;
             }
         }
-        section.end()?;
+        out.begin(Kind::ROOTS).map_err(output)?;
         for i in 0..self.layout.roots.len() {
             let n = self.layout.roots.get(i)? as usize;
             let node = self.nodes.get(n)?;
-            section.put(&[self.layout.nodes.get(n)?.number])?;
-            section.put(&node.center.map(f32::to_bits))?;
-            section.put(&[node.radius, node.eps].map(f32::to_bits))?;
+            put(&mut out, &[self.layout.nodes.get(n)?.number])?;
+            put(&mut out, &node.center.map(f32::to_bits))?;
+            put(&mut out, &[node.radius, node.eps].map(f32::to_bits))?;
         }
-        section.end()?;
-        out.seek(SeekFrom::Start(blocks_at)).map_err(Failure::Output)?;
-        let mut lengths = self.write_blocks(out, storage)?;
-        out.seek(SeekFrom::Start(index_at)).map_err(Failure::Output)?;
-        let (mut at, mut section) = (blocks_at, Section::new(out));
+        let mut at = out.begin(Kind::PAGES).map_err(output)?;
+        let mut lengths = self.write_blocks(&mut out, storage)?;
+        out.begin(Kind::PAGE_TABLE).map_err(output)?;
         for block in 0..lengths.len() {
             let length = u64::from(lengths.get(block)?);
             let entry = at | length << OFFSET_BITS;
-            section.put(&[entry as u32, (entry >> 32) as u32])?;
+            put(&mut out, &[entry as u32, (entry >> 32) as u32])?;
             at += length;
         }
-        section.end()
+        let length = out.finish(&self.header.encode()).map_err(output)?;
+        debug_assert_eq!(length, self.header.length);
+        Ok(())
     }
 
     /// Writes the blocks, and says how long each is.
@@ -184,34 +183,21 @@ impl<S: Storage> Arranged<S> {
 /// block; of a node of the lowest level, which children there are; position, normal, radius, sine, w x y z, eps.
 const RECORD: usize = 17;
 
-/// Records with a checksum at the end.
-struct Section<'o, W> {
-    out: &'o mut W,
-    sum: crc32fast::Hasher,
-    bytes: Vec<u8>,
+/// The sections in their order, and how they are checked.
+const KINDS: [(Kind, u32); 5] = [
+    (Kind::BASE_VERTICES, 0),
+    (Kind::BASE_TRIANGLES, 0),
+    (Kind::ROOTS, 0),
+    (Kind::PAGES, BY_PAGE),
+    (Kind::PAGE_TABLE, 0),
+];
+
+/// How long the file with a header and so many bytes of blocks will be.
+pub(crate) fn length(header: &Header, blocks: u64, georeference: &Georeference) -> io::Result<u64> {
+    let [vertices, faces, roots, index] = header.table_bytes();
+    sections::file_length(HEADER_BYTES, georeference, &[], &[vertices, faces, roots, blocks, index])
 }
 
-impl<'o, W: Write> Section<'o, W> {
-    fn new(out: &'o mut W) -> Self {
-        Self { out, sum: crc32fast::Hasher::new(), bytes: Vec::new() }
-    }
-
-    fn put(&mut self, words: &[u32]) -> Result<(), Failure> {
-        self.bytes.extend(words.iter().flat_map(|word| word.to_le_bytes()));
-        if self.bytes.len() >= 1 << 16 { self.flush() } else { Ok(()) }
-    }
-
-    fn flush(&mut self) -> Result<(), Failure> {
-        self.sum.update(&self.bytes);
-        self.out.write_all(&self.bytes).map_err(Failure::Output)?;
-        self.bytes.clear();
-        Ok(())
-    }
-
-    /// Writes the checksum. What follows is the next section.
-    fn end(&mut self) -> Result<(), Failure> {
-        self.flush()?;
-        let sum = std::mem::take(&mut self.sum).finalize();
-        self.out.write_all(&sum.to_le_bytes()).map_err(Failure::Output)
-    }
+fn put(out: &mut impl Write, words: &[u32]) -> Result<(), Failure> {
+    words.iter().try_for_each(|word| out.write_all(&word.to_le_bytes())).map_err(Failure::Output)
 }

@@ -4,6 +4,7 @@ use std::io;
 use std::path::PathBuf;
 
 use vertex_tree::LogError;
+use vertex_tree::sections::SectionError;
 
 /// A file could not be written, opened or checked, or a tree could not be made of it.
 #[derive(Debug, thiserror::Error)]
@@ -58,13 +59,13 @@ pub enum MetaNodeError {
         file: String,
     },
     /// The file was written by another version.
-    #[error("{file}: offset 8: version {version}, expected {expected}")]
+    #[error("{file}: offset 8: version {version}, expected 1 to {expected}")]
     Version {
         /// The file.
         file: String,
         /// As found.
         version: u32,
-        /// What this crate reads.
+        /// The latest that this crate reads.
         expected: u32,
     },
     /// The header names a vertex attribute layout that this version does not know.
@@ -107,6 +108,14 @@ pub enum MetaNodeError {
         /// Its name.
         section: &'static str,
     },
+    /// The sections of the file are not what they should be.
+    #[error("{file}: {source}")]
+    Sections {
+        /// The file.
+        file: String,
+        /// What is wrong with them.
+        source: SectionError,
+    },
     /// A page does not hold what it should.
     #[error("{file}: page {page} at offset {offset} is damaged: {reason}")]
     Page {
@@ -132,4 +141,16 @@ pub enum MetaNodeError {
     /// The thread that reads could not be started.
     #[error("no thread for reading: {0}")]
     Thread(io::Error),
+}
+
+impl MetaNodeError {
+    /// What is wrong with the sections of a file, under the name that it has always had.
+    pub(crate) fn of_sections(file: &str, error: SectionError) -> Self {
+        let file = file.to_owned();
+        match error {
+            SectionError::Io { offset, length, source } => Self::Io { file, offset, length, source },
+            SectionError::FileLength { expected, actual } => Self::Length { file, expected, actual },
+            source => Self::Sections { file, source },
+        }
+    }
 }

@@ -2,12 +2,14 @@
 
 use std::sync::Arc;
 
+use vertex_tree::sections::Sections;
 use vertex_tree::source::PageSource;
-use vertex_tree::{Bounds, NodeId};
+use vertex_tree::{Bounds, Georeference, NodeId};
 
 use crate::error::MetaNodeError;
-use crate::format::{HEADER_BYTES, Header, ROOT_WORDS, Root, TRIANGLE_WORDS, VERTEX_WORDS};
+use crate::format::{Header, ROOT_WORDS, Root, TRIANGLE_WORDS, VERTEX_WORDS};
 use crate::page::{self, Layout};
+use crate::tables::Tables;
 
 /// An open file: header, base mesh and the index of the pages are in memory, the pages are not. Shared, unchanging:
 /// several trees can show it at once, each with place holders of its own.
@@ -21,6 +23,10 @@ pub struct MetaNodeFile {
     lengths: Vec<u32>,
     /// Where every 64th page starts, in words from the first page: 1/16 of the memory of an offset a page.
     starts: Vec<u64>,
+    /// Where the first page starts, in bytes.
+    pages_at: u64,
+    georeference: Georeference,
+    sections: Sections,
 }
 
 /// Pages between two entries of [`MetaNodeFile::starts`].
@@ -39,15 +45,8 @@ impl MetaNodeFile {
     /// Whatever is wrong with them.
     pub fn open(source: Arc<dyn PageSource>) -> Result<Self, MetaNodeError> {
         let header = Header::read(&*source)?;
-        let mut words = vec![0; (header.tables_bytes() / 4) as usize];
-        read_words(&*source, HEADER_BYTES, &mut words)?;
-        if table_checksum(&words) != header.tables_checksum {
-            let file = source.name().to_owned();
-            return Err(MetaNodeError::Checksum { file, offset: HEADER_BYTES, section: "tables" });
-        }
-        let (roots, rest) = words.split_at(header.roots as usize * ROOT_WORDS);
-        let (vertices, rest) = rest.split_at(header.base_vertices as usize * VERTEX_WORDS);
-        let (triangles, lengths) = rest.split_at(header.base_triangles as usize * TRIANGLE_WORDS);
+        let Tables { at, words, pages_at, georeference, sections } = Tables::read(&*source, &header)?;
+        let [roots, vertices, triangles, lengths] = words;
         let f = f32::from_bits;
         let roots: Vec<Root> = roots
             .chunks_exact(ROOT_WORDS)
@@ -69,18 +68,28 @@ impl MetaNodeFile {
             }
             total += u64::from(length);
         }
-        let opened =
-            Self { header, roots, base_vertices, base_triangles, lengths: lengths.to_vec(), starts, source };
-        opened.check_tables(total)?;
+        let opened = Self {
+            source,
+            header,
+            roots,
+            base_vertices,
+            base_triangles,
+            lengths,
+            starts,
+            pages_at,
+            georeference,
+            sections,
+        };
+        opened.check_tables(at, total)?;
         Ok(opened)
     }
 
-    fn check_tables(&self, total_words: u64) -> Result<(), MetaNodeError> {
+    fn check_tables(&self, tables_at: [u64; 4], total_words: u64) -> Result<(), MetaNodeError> {
         let header = &self.header;
-        let error = |offset: usize, what: &'static str, value: u64| {
-            Err(MetaNodeError::Value { file: self.name().to_owned(), offset: offset as u64, what, value })
+        let error = |offset: u64, what: &'static str, value: u64| {
+            Err(MetaNodeError::Value { file: self.name().to_owned(), offset, what, value })
         };
-        let mut at = HEADER_BYTES as usize;
+        let [mut at, vertices_at, triangles_at, lengths_at] = tables_at;
         let mut before = None;
         for root in &self.roots {
             let (page, number) = (root.node.0 >> header.slot_bits, root.node.0);
@@ -91,30 +100,38 @@ impl MetaNodeFile {
                 return error(at + 4, "the number in the log of a root", root.log_number.into());
             }
             before = Some(number);
-            at += 4 * ROOT_WORDS;
+            at += 4 * ROOT_WORDS as u64;
         }
+        at = vertices_at;
         let mut least = 0;
         for &(leaf, position) in &self.base_vertices {
             if leaf < least || leaf >= header.leaves || !position.iter().all(|x| x.is_finite()) {
                 return error(at, "the leaf of a base vertex", leaf.into());
             }
             least = leaf + 1;
-            at += 4 * VERTEX_WORDS;
+            at += 4 * VERTEX_WORDS as u64;
         }
+        at = triangles_at;
         for corners in &self.base_triangles {
             if let Some(&leaf) = corners.iter().find(|&&leaf| leaf >= header.leaves) {
                 return error(at, "the leaf of a base triangle", leaf.into());
             }
-            at += 4 * TRIANGLE_WORDS;
+            at += 4 * TRIANGLE_WORDS as u64;
         }
         if self.base_vertices.first().is_some_and(|&(leaf, _)| leaf != 0) {
-            return error(at, "the first leaf of the base mesh", self.base_vertices[0].0.into());
+            return error(vertices_at, "the first leaf of the base mesh", self.base_vertices[0].0.into());
         }
+        at = lengths_at;
         for &length in &self.lengths {
             if length > header.largest_words {
                 return error(at, "the length of a page", length.into());
             }
             at += 4;
+        }
+        // Whoever opens a tree has memory for several of this size.
+        let largest = self.lengths.iter().copied().max().unwrap_or(0);
+        if largest != header.largest_words {
+            return error(60, "the size of the largest page", header.largest_words.into());
         }
         if total_words.checked_mul(4) != Some(header.page_bytes) {
             return error(64, "the length of all pages", header.page_bytes);
@@ -124,6 +141,18 @@ impl MetaNodeFile {
 
     pub(crate) fn name(&self) -> &str {
         self.source.name()
+    }
+
+    /// Where the mesh lies in the world.
+    #[must_use]
+    pub fn georeference(&self) -> &Georeference {
+        &self.georeference
+    }
+
+    /// Compares the checksums of what this version does not know.
+    pub(crate) fn verify_unknown(&self) -> Result<(), MetaNodeError> {
+        let error = |error| MetaNodeError::of_sections(self.name(), error);
+        self.sections.verify_unknown(&*self.source).map_err(error)
     }
 
     /// Bytes of a page, as it is stored and as its place holder is large.
@@ -142,7 +171,7 @@ impl MetaNodeFile {
         let page = page as usize;
         let from = page / STRIDE * STRIDE;
         let words: u64 = self.lengths[from..page].iter().map(|&length| u64::from(length)).sum();
-        HEADER_BYTES + self.header.tables_bytes() + 4 * (self.starts[page / STRIDE] + words)
+        self.pages_at + 4 * (self.starts[page / STRIDE] + words)
     }
 
     /// Bytes of the largest place holder.
@@ -167,9 +196,10 @@ impl MetaNodeFile {
     #[must_use]
     pub fn facts(&self) -> Vec<(&'static str, String)> {
         let h = &self.header;
-        let bytes = HEADER_BYTES + h.tables_bytes() + h.page_bytes;
+        let bytes = self.source.len();
         let mean = |sum: u64, count: u32| sum as f64 / f64::from(count.max(1));
-        vec![
+        let mut facts = vec![
+            ("format", format!("meta-nodes, version {} (backend meta-node)", h.version)),
             ("vertices", h.leaves.to_string()),
             ("triangles", h.triangles.to_string()),
             ("nodes", h.collapses.to_string()),
@@ -187,7 +217,9 @@ impl MetaNodeFile {
                 "least page memory, bytes",
                 (self.holder_bytes() * u64::from(crate::pager::LEAST_HOLDERS)).to_string(),
             ),
-        ]
+        ];
+        facts.extend(self.georeference.facts());
+        facts
     }
 }
 
@@ -201,10 +233,4 @@ fn read_words(source: &dyn PageSource, offset: u64, words: &mut [u32]) -> Result
     })?;
     words.iter_mut().for_each(|word| *word = u32::from_le(*word));
     Ok(())
-}
-
-fn table_checksum(words: &[u32]) -> u32 {
-    let mut hasher = crc32fast::Hasher::new();
-    words.iter().for_each(|word| hasher.update(&word.to_le_bytes()));
-    hasher.finalize()
 }

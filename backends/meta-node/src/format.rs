@@ -3,14 +3,14 @@
 //! ```text
 //! offset  bytes  field
 //!      0      8  magic "FFMETAND"
-//!      8      4  version, 1
-//!     12      4  attribute stride: bytes of further vertex attributes, 0 in version 1
+//!      8      4  version, 2
+//!     12      4  attribute stride: bytes of further vertex attributes, 0
 //!     16      4  V, leaves: vertices of the input
 //!     20      4  C, collapses: nodes
 //!     24      4  T, triangles of the input
 //!     28      4  of these, triangles with a doubled corner, which are never shown and not stored
 //!     32      4  R, roots
-//!     36      4  W, vertices of the base mesh
+//!     36      4  W, vertices of the base mesh: V - C
 //!     40      4  U, triangles of the base mesh
 //!     44      4  P, pages
 //!     48      4  root pages, at most P; they are the first
@@ -18,14 +18,19 @@
 //!     56      4  bits of a node's number that are its slot on its page, at most 12
 //!     60      4  words of the largest page, a place holder's size
 //!     64      8  bytes of all pages
-//!     72      4  CRC-32 of the tables
+//!     72      4  0
 //!     76      4  CRC-32 of bytes 0 to 75
-//!     80   28 R  roots: number, number in the log, centre, radius, error
-//!          16 W  vertices of the base mesh: leaf, place
-//!          12 U  triangles of the base mesh: three leaves
-//!           4 P  words of each page
-//!                pages, one after the other: see `page.rs`
+//!     80         table of sections, see `vertex_tree::sections`:
+//!                GEOR  where the mesh lies in the world, if that is to be said
+//!                ROOT  28 R, roots: number, number in the log, centre, radius, error
+//!                BASV  16 W, vertices of the base mesh: leaf, place
+//!                BAST  12 U, triangles of the base mesh: three leaves
+//!                PAGE  pages, one after the other: see `page.rs`
+//!                PAGT  4 P, words of each page
 //! ```
+//!
+//! Version 1, which is read too, has no table of sections: the header is followed by roots, base mesh, lengths of pages and
+//! pages with nothing between them, and has the CRC-32 of all but the pages at offset 72.
 //!
 //! The lengths of the tables and of the file follow from the header and are checked before anything is allocated.
 
@@ -37,7 +42,8 @@ use crate::page::{self, Limits};
 
 /// What a file of meta-nodes starts with.
 pub const MAGIC: [u8; 8] = *b"FFMETAND";
-pub(crate) const VERSION: u32 = 1;
+/// The version that is written. The first is read too.
+pub(crate) const VERSION: u32 = 2;
 pub(crate) const HEADER_BYTES: u64 = 80;
 pub(crate) const ROOT_WORDS: usize = 7;
 pub(crate) const VERTEX_WORDS: usize = 4;
@@ -46,6 +52,8 @@ pub(crate) const TRIANGLE_WORDS: usize = 3;
 /// The header.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub(crate) struct Header {
+    /// As read; what is written is [`VERSION`].
+    pub version: u32,
     pub leaves: u32,
     pub collapses: u32,
     pub triangles: u32,
@@ -59,6 +67,7 @@ pub(crate) struct Header {
     pub slot_bits: u32,
     pub largest_words: u32,
     pub page_bytes: u64,
+    /// In version 1.
     pub tables_checksum: u32,
 }
 
@@ -83,7 +92,7 @@ impl Header {
             self.largest_words,
             self.page_bytes as u32,
             (self.page_bytes >> 32) as u32,
-            self.tables_checksum,
+            0,
         ];
         for (at, word) in words.into_iter().enumerate() {
             bytes[8 + 4 * at..12 + 4 * at].copy_from_slice(&word.to_le_bytes());
@@ -93,12 +102,14 @@ impl Header {
         bytes
     }
 
-    /// Bytes from the end of the header to the first page.
-    pub fn tables_bytes(&self) -> u64 {
-        4 * (u64::from(self.roots) * ROOT_WORDS as u64
-            + u64::from(self.base_vertices) * VERTEX_WORDS as u64
-            + u64::from(self.base_triangles) * TRIANGLE_WORDS as u64
-            + u64::from(self.pages))
+    /// Words of the tables: roots, vertices and triangles of the base mesh, lengths of pages.
+    pub fn tables_words(&self) -> [u64; 4] {
+        [
+            u64::from(self.roots) * ROOT_WORDS as u64,
+            u64::from(self.base_vertices) * VERTEX_WORDS as u64,
+            u64::from(self.base_triangles) * TRIANGLE_WORDS as u64,
+            u64::from(self.pages),
+        ]
     }
 
     pub fn limits(&self) -> Limits {
@@ -138,7 +149,7 @@ impl Header {
         if bytes[..8] != MAGIC {
             return Err(MetaNodeError::Foreign { file: file() });
         }
-        if word(8) != VERSION {
+        if !(1..=VERSION).contains(&word(8)) {
             return Err(MetaNodeError::Version { file: file(), version: word(8), expected: VERSION });
         }
         if crc32fast::hash(&bytes[..76]) != word(76) {
@@ -148,6 +159,7 @@ impl Header {
             return Err(MetaNodeError::Attributes { file: file(), stride: word(12) });
         }
         let header = Self {
+            version: word(8),
             leaves: word(16),
             collapses: word(20),
             triangles: word(24),
@@ -164,13 +176,6 @@ impl Header {
             tables_checksum: word(72),
         };
         header.check(&file)?;
-        // No sum overflows: each table has fewer than 2^32 entries of at most 28 bytes, and a page at most 2^34 bytes.
-        let pages = u128::from(header.page_bytes);
-        let expected = u128::from(HEADER_BYTES + header.tables_bytes()) + pages;
-        if expected != u128::from(actual) {
-            let expected = u64::try_from(expected).unwrap_or(u64::MAX);
-            return Err(MetaNodeError::Length { file: file(), expected, actual });
-        }
         Ok(header)
     }
 
@@ -207,6 +212,20 @@ impl Header {
             if value < least || value > greatest {
                 return Err(MetaNodeError::Value { file: file(), offset, what, value });
             }
+        }
+        // Every vertex stays or is removed by a collapse, which there are fewer of.
+        if self.leaves - self.collapses != self.base_vertices {
+            let value = self.leaves.into();
+            return Err(MetaNodeError::Value {
+                file: file(),
+                offset: 16,
+                what: "the number of leaves",
+                value,
+            });
+        }
+        if self.version > 1 && self.tables_checksum != 0 {
+            let value = self.tables_checksum.into();
+            return Err(MetaNodeError::Value { file: file(), offset: 72, what: "a word without use", value });
         }
         let slots = u64::from(self.pages) << self.slot_bits;
         if slots > most {

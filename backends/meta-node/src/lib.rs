@@ -35,6 +35,7 @@ mod pager;
 mod settings;
 mod store;
 mod subtree;
+mod tables;
 mod tree;
 mod verify;
 mod waiting;

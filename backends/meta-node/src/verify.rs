@@ -34,6 +34,7 @@ impl MetaNodeFile {
     /// # Errors
     /// The first thing that is wrong.
     pub fn verify(&self) -> Result<(), MetaNodeError> {
+        self.verify_unknown()?;
         let header = &self.header;
         let mut verifier = Verifier {
             file: self,

@@ -1,12 +1,13 @@
 //! From a collapse log to a file.
 
 use std::fs::File;
-use std::io::{self, BufWriter, Seek, SeekFrom, Write};
+use std::io::{self, Write};
 use std::path::Path;
 use std::sync::atomic::{AtomicBool, Ordering};
 
 use vertex_tree::external::Workspace;
-use vertex_tree::{CollapseLog, LogSource, NONE, output};
+use vertex_tree::sections::{BY_PAGE, Kind, SectionWriter};
+use vertex_tree::{CollapseLog, Georeference, LogSource, NONE, output};
 
 use crate::arrange::{Arrangement, Node};
 use crate::blocking::{self, Blocking};
@@ -78,9 +79,10 @@ pub fn write_within(
     if pages * slots > u64::from(u32::MAX) {
         return Err(MetaNodeError::TooLarge { pages, slots });
     }
-    let mut written = Header::default();
+    let (mut written, mut bytes) = (Header::default(), 0);
     output::write_with(path, |file| {
-        written = Writer { arrangement: &arrangement, blocking: &blocking }.write(file)?;
+        let writer = Writer { arrangement: &arrangement, blocking: &blocking };
+        (written, bytes) = writer.write(file, log.georeference())?;
         arrangement.check()
     })
     .map_err(|source| match source {
@@ -92,7 +94,7 @@ pub fn write_within(
         blocks: blocking.blocks.len() as u64,
         pages,
         largest_page: 4 * u64::from(written.largest_words),
-        bytes: HEADER_BYTES + written.tables_bytes() + written.page_bytes,
+        bytes,
     })
 }
 
@@ -102,7 +104,8 @@ struct Writer<'a> {
 }
 
 impl Writer<'_> {
-    fn write(&self, file: &mut File) -> io::Result<Header> {
+    /// Writes the file; says what its header is and how long it is.
+    fn write(&self, file: &mut File, georeference: &Georeference) -> io::Result<(Header, u64)> {
         let Self { arrangement, blocking } = self;
         let mut header = Header {
             leaves: arrangement.leaves,
@@ -118,9 +121,28 @@ impl Writer<'_> {
             slot_bits: blocking.slot_bits,
             ..Header::default()
         };
-        let mut out = BufWriter::with_capacity(1 << 20, file);
-        // Pages first, since the tables say how long they are.
-        out.seek(SeekFrom::Start(HEADER_BYTES + header.tables_bytes()))?;
+        let kinds = [
+            (Kind::ROOTS, 0),
+            (Kind::BASE_VERTICES, 0),
+            (Kind::BASE_TRIANGLES, 0),
+            (Kind::PAGES, BY_PAGE),
+            (Kind::PAGE_TABLE, 0),
+        ];
+        let mut out = SectionWriter::new(file, HEADER_BYTES, georeference, &[], &kinds)?;
+        out.begin(Kind::ROOTS)?;
+        for &root in &arrangement.roots {
+            let node = arrangement.node(root);
+            put(&mut out, &[blocking.number[root as usize].0, node.log_number])?;
+            put(&mut out, &page::bounds_words(&node.bounds))?;
+        }
+        out.begin(Kind::BASE_VERTICES)?;
+        for &leaf in &arrangement.base_leaves {
+            put(&mut out, &[leaf])?;
+            put(&mut out, &arrangement.position(leaf).map(f32::to_bits))?;
+        }
+        out.begin(Kind::BASE_TRIANGLES)?;
+        put(&mut out, arrangement.base_triangles.as_flattened())?;
+        out.begin(Kind::PAGES)?;
         let (mut words, mut lengths) = (Vec::new(), Vec::with_capacity(blocking.pages.len()));
         for page in 0..header.pages {
             words.clear();
@@ -128,37 +150,12 @@ impl Writer<'_> {
             lengths.push(words.len() as u32);
             header.largest_words = header.largest_words.max(words.len() as u32);
             header.page_bytes += 4 * words.len() as u64;
-            for word in &words {
-                out.write_all(&word.to_le_bytes())?;
-            }
+            put(&mut out, &words)?;
         }
-        out.seek(SeekFrom::Start(HEADER_BYTES))?;
-        let mut checksum = crc32fast::Hasher::new();
-        self.tables(&lengths, |word| {
-            checksum.update(&word.to_le_bytes());
-            out.write_all(&word.to_le_bytes())
-        })?;
-        header.tables_checksum = checksum.finalize();
-        out.seek(SeekFrom::Start(0))?;
-        out.write_all(&header.encode())?;
-        out.flush()?;
-        Ok(header)
-    }
-
-    fn tables(&self, lengths: &[u32], mut put: impl FnMut(u32) -> io::Result<()>) -> io::Result<()> {
-        let Self { arrangement, blocking } = self;
-        for &root in &arrangement.roots {
-            let node = arrangement.node(root);
-            put(blocking.number[root as usize].0)?;
-            put(node.log_number)?;
-            page::bounds_words(&node.bounds).into_iter().try_for_each(&mut put)?;
-        }
-        for &leaf in &arrangement.base_leaves {
-            put(leaf)?;
-            arrangement.position(leaf).into_iter().map(f32::to_bits).try_for_each(&mut put)?;
-        }
-        arrangement.base_triangles.iter().flatten().copied().try_for_each(&mut put)?;
-        lengths.iter().copied().try_for_each(put)
+        out.begin(Kind::PAGE_TABLE)?;
+        put(&mut out, &lengths)?;
+        let bytes = out.finish(&header.encode())?;
+        Ok((header, bytes))
     }
 
     /// The words of a page.
@@ -234,4 +231,8 @@ impl Writer<'_> {
         ]);
         words[0] = page::checksum(words);
     }
+}
+
+fn put(out: &mut impl Write, words: &[u32]) -> io::Result<()> {
+    words.iter().try_for_each(|word| out.write_all(&word.to_le_bytes()))
 }

@@ -4,6 +4,7 @@ use std::io;
 use std::path::PathBuf;
 
 use vertex_tree::LogError;
+use vertex_tree::sections::SectionError;
 
 /// A file could not be written, opened or read.
 #[derive(Debug, thiserror::Error)]
@@ -28,7 +29,7 @@ pub enum MtError {
         file: String,
     },
     /// The file was written by another version.
-    #[error("{file}: offset 8: version {version}, expected 1")]
+    #[error("{file}: offset 8: version {version}, expected 1 or 2")]
     Version {
         /// The file.
         file: String,
@@ -75,6 +76,14 @@ pub enum MtError {
         /// Its name.
         section: &'static str,
     },
+    /// The sections of the file are not what they should be.
+    #[error("{file}: {source}")]
+    Sections {
+        /// The file.
+        file: String,
+        /// What is wrong with them.
+        source: SectionError,
+    },
     /// Two nodes contradict each other.
     #[error("{file}: node {node} at offset {offset}: {what} {other}")]
     Contradiction {
@@ -119,4 +128,16 @@ pub enum MtError {
         /// The least that would do.
         needed: u64,
     },
+}
+
+impl MtError {
+    /// What is wrong with the sections of a file, under the name that it has always had.
+    pub(crate) fn of_sections(file: &str, error: SectionError) -> Self {
+        let file = file.to_owned();
+        match error {
+            SectionError::Io { offset, length, source } => Self::Io { file, offset, length, source },
+            SectionError::FileLength { expected, actual } => Self::Length { file, expected, actual },
+            source => Self::Sections { file, source },
+        }
+    }
 }

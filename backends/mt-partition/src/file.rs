@@ -2,11 +2,13 @@
 
 use std::sync::Arc;
 
+use vertex_tree::sections::Sections;
 use vertex_tree::source::PageSource;
-use vertex_tree::{Bounds, NONE, NodeId};
+use vertex_tree::{Bounds, Georeference, NONE, NodeId};
 
 use crate::MtError;
-use crate::format::{CHECKSUM, HEADER, Header, MAGIC, NODE, PARTITION, ROOT, VERSION};
+use crate::format::{Header, NODE, PARTITION, ROOT};
+use crate::opening::{Opener, words};
 use crate::record::{Limits, Record};
 
 /// A file, opened. Its tables stay in memory, about 16 bytes a node, and with them the base mesh; shared between trees.
@@ -23,6 +25,8 @@ pub struct MtFile {
     offsets: Vec<u64>,
     pub(crate) log_numbers: Vec<u32>,
     pub(crate) base: Record,
+    georeference: Georeference,
+    sections: Option<Sections>,
 }
 
 impl std::fmt::Debug for MtFile {
@@ -61,27 +65,27 @@ impl MtFile {
         let opener = Opener { source: &*source };
         let header = opener.header()?;
         let nodes = header.nodes as usize;
-        let mut at = HEADER as u64;
+        let tables = opener.tables(&header)?;
+        let (start, table) = &tables.roots;
         let mut roots = Vec::with_capacity(header.roots as usize);
         let mut root_bounds = Vec::with_capacity(header.roots as usize);
         let range = |offset, what, value: u32| opener.range(offset, what, value.into());
-        for entry in opener.table("roots", &mut at, header.roots * ROOT)?.chunks_exact(ROOT as usize) {
+        for entry in table.chunks_exact(ROOT as usize) {
             let [node, x, y, z, radius, eps] = words(entry);
             if u64::from(node) >= header.nodes || roots.last().is_some_and(|&last| NodeId(node) <= last) {
-                return Err(range(HEADER as u64, "root", node));
+                return Err(range(*start, "root", node));
             }
             let [x, y, z, radius, eps] = [x, y, z, radius, eps].map(f32::from_bits);
             if ![x, y, z].iter().all(|x| x.is_finite())
                 || !(0.0..=f32::MAX).contains(&radius)
                 || !(0.0..=f32::MAX).contains(&eps)
             {
-                return Err(range(HEADER as u64, "bounds of root", node));
+                return Err(range(*start, "bounds of root", node));
             }
             roots.push(NodeId(node));
             root_bounds.push(Bounds { center: [x, y, z], radius, eps });
         }
-        let start = at;
-        let table = opener.table("partitions", &mut at, header.partitions * PARTITION)?;
+        let (start, table) = &tables.partitions;
         let mut partitions: Vec<u32> =
             table.chunks_exact(PARTITION as usize).map(|e| words::<1>(e)[0]).collect();
         partitions.push(header.nodes as u32);
@@ -89,47 +93,65 @@ impl MtFile {
         if let Some(pair) =
             ascending.or(partitions.first().filter(|&&first| first != 0).map(|_| &partitions[..1]))
         {
-            return Err(range(start, "first node of a partition", pair[0]));
+            return Err(range(*start, "first node of a partition", pair[0]));
         }
         // The first is 0, the last the number of nodes, so this adds up.
         let partition_of = (0..)
             .zip(partitions.windows(2))
             .flat_map(|(p, pair)| std::iter::repeat_n(p, (pair[1] - pair[0]) as usize))
             .collect();
-        let start = at;
-        let table = opener.table("nodes", &mut at, header.nodes * NODE)?;
+        let (start, table) = &tables.nodes;
         let mut offsets = Vec::with_capacity(nodes + 1);
         let mut log_numbers = Vec::with_capacity(nodes);
-        let mut end = at + header.source_bytes;
+        let mut end = tables.records_at;
         offsets.push(end);
         for entry in table.chunks_exact(NODE as usize) {
             let [length, log_number] = words(entry);
             if u64::from(log_number) >= header.collapses {
-                return Err(range(start, "number in the log", log_number));
+                return Err(range(*start, "number in the log", log_number));
             }
             // At most 2^32 lengths below 2^32, on top of a source that is shorter than the file.
             end += u64::from(length);
             offsets.push(end);
             log_numbers.push(log_number);
         }
-        if end != source.len() {
-            return Err(MtError::Length {
-                file: source.name().to_owned(),
-                expected: end,
-                actual: source.len(),
-            });
-        }
+        opener.check_records(&tables, end - tables.records_at)?;
         // Memory is measured by it.
         if header.change_bytes > end {
             return Err(opener.range(104, "bytes of the largest change", header.change_bytes));
         }
-        let bytes = opener.read(at, header.source_bytes)?;
+        let (at, bytes) = &tables.base;
         let limits = Limits { nodes: header.nodes as u32, vertices: header.vertices as u32 };
-        let base = Record::new(&bytes, limits).map_err(|wrong| opener.record(at, wrong))?;
+        let base = Record::new(bytes, limits).map_err(|wrong| opener.record(*at, wrong))?;
         if base.number() != NONE || base.above().next().is_some() {
-            return Err(range(at, "number of the source", base.number()));
+            return Err(range(*at, "number of the source", base.number()));
         }
-        Ok(Self { source, header, roots, root_bounds, partitions, partition_of, offsets, log_numbers, base })
+        let (georeference, sections) = (tables.georeference, tables.sections);
+        Ok(Self {
+            source,
+            header,
+            roots,
+            root_bounds,
+            partitions,
+            partition_of,
+            offsets,
+            log_numbers,
+            base,
+            georeference,
+            sections,
+        })
+    }
+
+    /// Where the mesh lies in the world.
+    #[must_use]
+    pub fn georeference(&self) -> &Georeference {
+        &self.georeference
+    }
+
+    /// Compares the checksums of what this version does not know.
+    pub(crate) fn verify_unknown(&self) -> Result<(), MtError> {
+        let Some(sections) = &self.sections else { return Ok(()) };
+        sections.verify_unknown(&*self.source).map_err(|error| MtError::of_sections(self.name(), error))
     }
 
     /// What errors call the file.
@@ -163,8 +185,11 @@ impl MtFile {
         let per = |a: u64, b: u64| a as f64 / b.max(1) as f64;
         let (bytes, triangles) = (self.source.len(), h.triangles);
         let partitions = self.partitions.len() - 1;
-        vec![
-            ("format", "partitioned multi-triangulation, version 1 (backend mt-partition)".to_owned()),
+        let mut facts = vec![
+            (
+                "format",
+                format!("partitioned multi-triangulation, version {} (backend mt-partition)", h.version),
+            ),
             ("bytes", format!("{bytes} ({:.1} a triangle)", per(bytes, triangles))),
             ("vertices", h.vertices.to_string()),
             ("triangles", triangles.to_string()),
@@ -202,7 +227,9 @@ impl MtFile {
             ("growth of radii", format!("{:.3} mean, {:.2} largest", h.inflation[0], h.inflation[1])),
             ("base triangles", self.base.fine().to_string()),
             ("least memory", self.least_memory().to_string()),
-        ]
+        ];
+        facts.extend(self.georeference.facts());
+        facts
     }
 
     pub(crate) fn root_bounds(&self, node: NodeId) -> Option<Bounds> {
@@ -286,102 +313,4 @@ impl MtFile {
     pub(crate) fn offset(&self, node: u32) -> u64 {
         self.offsets[node as usize]
     }
-}
-
-/// Reads while there is no file yet, and makes errors.
-struct Opener<'a> {
-    source: &'a dyn PageSource,
-}
-
-impl Opener<'_> {
-    fn file(&self) -> String {
-        self.source.name().to_owned()
-    }
-
-    fn range(&self, offset: u64, what: &'static str, value: u64) -> MtError {
-        MtError::Range { file: self.file(), offset, what, value }
-    }
-
-    fn record(&self, offset: u64, (what, value): (&'static str, u64)) -> MtError {
-        if what == "checksum" {
-            return MtError::Checksum { file: self.file(), offset, section: "node" };
-        }
-        self.range(offset, what, value)
-    }
-
-    /// Reads bytes, of which there are so many.
-    fn read(&self, offset: u64, length: u64) -> Result<Vec<u8>, MtError> {
-        let io = |source| MtError::Io { file: self.file(), offset, length, source };
-        let room = usize::try_from(length).map_err(|_| io(std::io::ErrorKind::OutOfMemory.into()))?;
-        let mut bytes = vec![0; room];
-        self.source.read_at(offset, &mut bytes).map_err(io)?;
-        Ok(bytes)
-    }
-
-    fn header(&self) -> Result<Header, MtError> {
-        let actual = self.source.len();
-        let mut bytes = [0; HEADER];
-        let known = actual.min(HEADER as u64) as usize;
-        bytes[..known].copy_from_slice(&self.read(0, known as u64)?);
-        if bytes[..8] != MAGIC {
-            return Err(MtError::NotThis { file: self.file() });
-        }
-        if known < HEADER {
-            return Err(MtError::Length { file: self.file(), expected: HEADER as u64, actual });
-        }
-        let [version, stride] = words(&bytes[8..16]);
-        if version != VERSION {
-            return Err(MtError::Version { file: self.file(), version });
-        }
-        if stride != 0 {
-            return Err(MtError::Attributes { file: self.file(), stride });
-        }
-        if words(&bytes[HEADER - 4..]) != [crc32fast::hash(&bytes[..HEADER - 4])] {
-            return Err(MtError::Checksum { file: self.file(), offset: 0, section: "header" });
-        }
-        let header = Header::decode(&bytes);
-        let most = u64::from(NONE) - 1;
-        let limits = [
-            (16, "vertices", header.vertices, most),
-            (24, "triangles", header.triangles, most),
-            (32, "collapses", header.collapses, most),
-            (40, "nodes", header.nodes, header.collapses),
-            (48, "partitions", header.partitions, header.nodes),
-            (56, "roots", header.roots, header.nodes),
-            (112, "nodes of the largest change", header.change_nodes, header.nodes),
-        ];
-        for (offset, what, value, limit) in limits {
-            if value > limit {
-                return Err(self.range(offset, what, value));
-            }
-        }
-        if header.nodes > 0 && header.partitions == 0 {
-            return Err(self.range(48, "partitions", 0));
-        }
-        let least = header.tables_end().saturating_add(header.source_bytes);
-        if actual < least {
-            return Err(MtError::Length { file: self.file(), expected: least, actual });
-        }
-        Ok(header)
-    }
-
-    /// Reads a table of a known length and checks it.
-    fn table(&self, section: &'static str, at: &mut u64, length: u64) -> Result<Vec<u8>, MtError> {
-        let mut bytes = self.read(*at, length + CHECKSUM)?;
-        let checksum = bytes.split_off(length as usize);
-        if words(&checksum) != [crc32fast::hash(&bytes)] {
-            return Err(MtError::Checksum { file: self.file(), offset: *at, section });
-        }
-        *at += length + CHECKSUM;
-        Ok(bytes)
-    }
-}
-
-/// The first numbers in some bytes, of which there are enough.
-fn words<const N: usize>(bytes: &[u8]) -> [u32; N] {
-    std::array::from_fn(|i| {
-        let mut word = [0; 4];
-        word.copy_from_slice(&bytes[4 * i..4 * i + 4]);
-        u32::from_le_bytes(word)
-    })
 }

@@ -3,8 +3,8 @@
 //! ```text
 //! offset  bytes  field
 //!      0      8  magic "FFMTPART"
-//!      8      4  version, 1
-//!     12      4  attribute stride: bytes of further vertex attributes, 0 in version 1
+//!      8      4  version, 2
+//!     12      4  attribute stride: bytes of further vertex attributes, 0
 //!     16      8  input vertices, less than 2^32 - 1
 //!     24      8  input triangles, less than 2^32 - 1
 //!     32      8  collapses in the log, less than 2^32 - 1
@@ -24,31 +24,38 @@
 //!    144      4  requested nodes a partition
 //!    148      4  order of the partitioning queue: 0 increasing, 1 decreasing
 //!    152      4  CRC-32 of bytes 0 to 151
-//!    156   24 R  roots, in ascending order: node u32, centre 3 f32, radius f32, eps f32
-//!             4  CRC-32 of the roots
-//!           4 P  partitions: first node u32; a partition ends where the next one starts
-//!             4  CRC-32 of the partitions
-//!           8 N  nodes: bytes of the record u32, number in the collapse log u32
-//!             4  CRC-32 of the nodes
-//!             S  the source: a record whose outgoing arcs hold the base mesh
-//!                the nodes' records (see `record`), in order of their numbers, each with its own CRC-32
+//!    156      4  zeros
+//!    160         table of sections, see `vertex_tree::sections`:
+//!                GEOR  where the mesh lies in the world, if that is to be said
+//!                ROOT  24 R, roots, in ascending order: node u32, centre 3 f32, radius f32, eps f32
+//!                PART  4 P, partitions: first node u32; a partition ends where the next one starts
+//!                BASE  S, the source: a record whose outgoing arcs hold the base mesh
+//!                PAGE  the nodes' records (see `record`), in order of their numbers, each with its own CRC-32
+//!                NODE  8 N, nodes: bytes of the record u32, number in the collapse log u32
 //! ```
+//!
+//! Version 1, which is read too, has no table of sections: the header is followed by roots, partitions and nodes, each with a
+//! CRC-32 behind it, source and records, with nothing between them.
 //!
 //! Nodes of a partition have consecutive numbers, so a partition is one read; so is a single node. The length of the file
 //! follows from the tables and is checked, and so is that of the tables, before anything is allocated.
 
 /// What a file of this format starts with.
 pub const MAGIC: [u8; 8] = *b"FFMTPART";
-pub(crate) const VERSION: u32 = 1;
+/// The version that is written. The first is read too.
+pub(crate) const VERSION: u32 = 2;
 pub(crate) const HEADER: usize = 156;
 pub(crate) const ROOT: u64 = 24;
 pub(crate) const PARTITION: u64 = 4;
 pub(crate) const NODE: u64 = 8;
+/// Behind the tables of version 1.
 pub(crate) const CHECKSUM: u64 = 4;
 
 /// The numbers in the header.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub(crate) struct Header {
+    /// As read; what is written is [`VERSION`].
+    pub version: u32,
     pub vertices: u64,
     pub triangles: u64,
     pub collapses: u64,
@@ -117,6 +124,7 @@ impl Header {
             u32::from_le_bytes(word)
         };
         Self {
+            version: short(8),
             vertices: long(16),
             triangles: long(24),
             collapses: long(32),
@@ -137,8 +145,8 @@ impl Header {
         }
     }
 
-    /// Where the tables end and the source starts. The counts are below 2^32: nothing overflows.
-    pub fn tables_end(&self) -> u64 {
-        HEADER as u64 + ROOT * self.roots + PARTITION * self.partitions + NODE * self.nodes + 3 * CHECKSUM
+    /// Bytes of roots, partitions and nodes. The counts are below 2^32: nothing overflows.
+    pub fn table_bytes(&self) -> [u64; 3] {
+        [ROOT * self.roots, PARTITION * self.partitions, NODE * self.nodes]
     }
 }

@@ -37,6 +37,7 @@ mod file;
 mod format;
 mod graph;
 mod memory;
+mod opening;
 mod order;
 mod paging;
 mod partition;

@@ -34,6 +34,7 @@ impl MtFile {
     /// # Errors
     /// The first thing that does not fit.
     pub fn verify(&self) -> Result<(), MtError> {
+        self.verify_unknown()?;
         let nodes = self.nodes();
         let range =
             |offset, what, value| MtError::Range { file: self.name().to_owned(), offset, what, value };

@@ -51,4 +51,25 @@ impl Georeference {
     pub fn local(&self, world: [f64; 3]) -> [f64; 3] {
         std::array::from_fn(|axis| world[axis] - self.origin[axis])
     }
+
+    /// What there is to say about it, as name and value: nothing where it is the default.
+    #[must_use]
+    pub fn facts(&self) -> Vec<(&'static str, String)> {
+        if *self == Self::default() {
+            return Vec::new();
+        }
+        let [x, y, z] = self.origin;
+        let mut facts = vec![("origin", format!("{x} {y} {z}"))];
+        if !self.coordinate_system.is_empty() {
+            facts.push(("coordinate system", self.coordinate_system.clone()));
+        }
+        if let Some(DegreeMap { longitude, latitude, metres_per_degree: [a, b] }) = self.degrees {
+            facts.push(("degrees", format!("from {longitude} {latitude}, {a} {b} metres each")));
+        }
+        if self.rounding != Rounding::default() {
+            facts.push(("largest move", self.rounding.largest_move.to_string()));
+            facts.push(("median edge", self.rounding.median_edge.to_string()));
+        }
+        facts
+    }
 }

@@ -6,7 +6,7 @@ use std::path::{Path, PathBuf};
 
 use crate::external::{BackReader, Reader};
 use crate::log_file::{self, LogCounts, LogFileError, Opened};
-use crate::{Collapse, CollapseLog};
+use crate::{Collapse, CollapseLog, Georeference};
 
 /// Records, one after the other.
 pub type Records<'a, T> = Box<dyn Iterator<Item = io::Result<T>> + 'a>;
@@ -16,6 +16,9 @@ pub type Records<'a, T> = Box<dyn Iterator<Item = io::Result<T>> + 'a>;
 pub trait LogSource {
     /// How many records there are of each kind.
     fn counts(&self) -> LogCounts;
+
+    /// Where the mesh lies in the world.
+    fn georeference(&self) -> &Georeference;
 
     /// The positions of the vertices.
     fn positions(&self) -> Records<'_, [f32; 3]>;
@@ -37,6 +40,10 @@ impl LogSource for CollapseLog {
             triangles: self.mesh.triangles.len() as u64,
             collapses: self.collapses.len() as u64,
         }
+    }
+
+    fn georeference(&self) -> &Georeference {
+        &self.mesh.georeference
     }
 
     fn positions(&self) -> Records<'_, [f32; 3]> {
@@ -71,14 +78,11 @@ impl LogFile {
     pub fn open(path: &Path) -> Result<Self, LogFileError> {
         let io = |source| LogFileError::Io { file: path.to_owned(), source };
         let opened = log_file::open(path)?;
-        let starts = opened.starts;
         let mut found = [0; 3];
-        for (sum, ends) in found.iter_mut().zip(starts.windows(2)) {
-            *sum = checksum(&opened.file, ends[0], ends[1]).map_err(io)?;
+        for (sum, (start, end)) in found.iter_mut().zip(opened.places) {
+            *sum = checksum(opened.file(), start, end).map_err(io)?;
         }
-        let written: io::Result<Vec<u32>> =
-            Reader::new(&opened.file, starts[3], 0..3, 3).map(|w| w.map(|[w]| u32::from_le(w))).collect();
-        log_file::compare_checksums(path, found, &written.map_err(io)?, starts)?;
+        log_file::compare_checksums(path, &opened, found)?;
         Ok(Self { path: path.to_owned(), opened })
     }
 
@@ -88,8 +92,20 @@ impl LogFile {
         &self.path
     }
 
+    /// Where the mesh lies in the world.
+    #[must_use]
+    pub fn georeference(&self) -> &Georeference {
+        &self.opened.georeference
+    }
+
+    /// The version of the format that the file is in.
+    #[must_use]
+    pub fn version(&self) -> u32 {
+        self.opened.version
+    }
+
     fn read<const N: usize>(&self, section: usize, count: u64) -> Reader<'_, N> {
-        Reader::new(&self.opened.file, self.opened.starts[section], 0..count, RECORDS)
+        Reader::new(self.opened.file(), self.opened.places[section].0, 0..count, RECORDS)
     }
 }
 
@@ -116,6 +132,10 @@ impl LogSource for LogFile {
         self.opened.counts
     }
 
+    fn georeference(&self) -> &Georeference {
+        &self.opened.georeference
+    }
+
     fn positions(&self) -> Records<'_, [f32; 3]> {
         let words = self.read::<3>(0, self.counts().vertices);
         Box::new(words.map(|w| w.map(|w| w.map(|w| f32::from_bits(u32::from_le(w))))))
@@ -132,7 +152,8 @@ impl LogSource for LogFile {
     }
 
     fn collapses_back(&self) -> Records<'_, Collapse> {
-        let words = BackReader::<7>::new(&self.opened.file, self.opened.starts[2], self.counts().collapses);
+        let words =
+            BackReader::<7>::new(self.opened.file(), self.opened.places[2].0, self.counts().collapses);
         Box::new(words.map(|w| w.map(|w| log_file::collapse(w.map(u32::from_le)))))
     }
 }
@@ -169,7 +190,7 @@ mod tests {
         assert!(same(file.collapses(), log.collapses()));
         assert!(same(file.collapses_back(), log.collapses_back()));
         let bytes = std::fs::read(&path).unwrap();
-        for at in [50, bytes.len() / 3, bytes.len() - 100, bytes.len() - 1] {
+        for at in [160, bytes.len() / 3, bytes.len() - 100, bytes.len() - 1] {
             let mut changed = bytes.clone();
             changed[at] ^= 1;
             std::fs::write(&path, changed).unwrap();

@@ -52,8 +52,8 @@ fn foreign_files_are_named() {
         assert!(matches!(open(bytes), Err(XfmError::NotXfm { .. })));
     }
     let mut later = small_file(4, false);
-    later[8] = 2;
-    assert_eq!(open(&later).err().unwrap().to_string(), "bytes: offset 8: the version is 2, expected 1");
+    later[8] = 3;
+    assert_eq!(open(&later).err().unwrap().to_string(), "bytes: offset 8: the version is 3, expected 1 or 2");
 }
 
 fn word(bytes: &[u8], at: usize) -> u32 {
@@ -68,29 +68,49 @@ fn put(bytes: &mut [u8], at: usize, value: u32) {
     bytes[at..at + 4].copy_from_slice(&value.to_le_bytes());
 }
 
-/// Where the blocks are, as the index of an intact file says.
-fn blocks(bytes: &[u8]) -> Vec<(usize, usize)> {
-    let counts = [24, 32, 40].map(|at| long(bytes, at) as usize);
-    let index = 148 + counts.iter().map(|n| 24 * n + 4).sum::<usize>();
-    let entry = |b: usize| long(bytes, index + 8 * b);
-    let count = long(bytes, 48) as usize;
-    (0..count).map(|b| ((entry(b) & ((1 << 48) - 1)) as usize, (entry(b) >> 48) as usize)).collect()
+/// Where things are in an intact file.
+struct Places {
+    /// The entries in the table of sections that have a checksum: where they are, and start and length of the sections.
+    sections: Vec<(usize, usize, usize)>,
+    table_end: usize,
+    /// Start and length of each block.
+    blocks: Vec<(usize, usize)>,
 }
 
-/// Makes all checksums right again; blocks are where they were in the intact file.
-fn reseal(bytes: &mut [u8], counts: [usize; 4], blocks: &[(usize, usize)]) {
-    let mut at = 148;
-    for length in [24 * counts[0], 24 * counts[1], 24 * counts[2], 8 * counts[3]] {
-        let sum = crc32fast::hash(&bytes[at..at + length]);
-        put(bytes, at + length, sum);
-        at += length + 4;
+const TABLE: usize = 152;
+
+impl Places {
+    fn new(bytes: &[u8]) -> Self {
+        let table_end = TABLE + 8 + 32 * word(bytes, TABLE) as usize;
+        let all = (TABLE + 8..table_end).step_by(32);
+        let place = |at: usize| (at, long(bytes, at + 8) as usize, long(bytes, at + 16) as usize);
+        let index = place(all.clone().find(|&at| bytes[at..at + 4] == *b"PAGT").unwrap()).1;
+        let entry = |b: usize| long(bytes, index + 8 * b);
+        let count = long(bytes, 48) as usize;
+        Self {
+            sections: all.filter(|&at| word(bytes, at + 4) & 2 == 0).map(place).collect(),
+            table_end,
+            blocks: (0..count)
+                .map(|b| ((entry(b) & ((1 << 48) - 1)) as usize, (entry(b) >> 48) as usize))
+                .collect(),
+        }
     }
-    for (number, &(start, length)) in (0_u32..).zip(blocks) {
-        let body = [&number.to_le_bytes()[..], &bytes[start..start + length - 4]].concat();
-        put(bytes, start + length - 4, crc32fast::hash(&body));
+
+    /// Makes all checksums right again.
+    fn reseal(&self, bytes: &mut [u8]) {
+        for (number, &(start, length)) in (0_u32..).zip(&self.blocks) {
+            let body = [&number.to_le_bytes()[..], &bytes[start..start + length - 4]].concat();
+            put(bytes, start + length - 4, crc32fast::hash(&body));
+        }
+        for &(at, start, length) in &self.sections {
+            let sum = crc32fast::hash(&bytes[start..start + length]);
+            put(bytes, at + 24, sum);
+        }
+        let table = [&bytes[TABLE..TABLE + 4], &bytes[TABLE + 8..self.table_end]].concat();
+        put(bytes, TABLE + 4, crc32fast::hash(&table));
+        let sum = crc32fast::hash(&bytes[..144]);
+        put(bytes, 144, sum);
     }
-    let sum = crc32fast::hash(&bytes[..144]);
-    put(bytes, 144, sum);
 }
 
 /// Takes everything.
@@ -162,8 +182,8 @@ fn hostile_files_end_in_errors() {
         let levels = 1 + seed as u32 % 5;
         let quantize = seed % 3 == 0;
         let mut bytes = small_file(levels, quantize);
-        let counts = [24, 32, 40, 48].map(|at| long(&bytes, at) as usize);
-        let blocks = blocks(&bytes);
+        let places = Places::new(&bytes);
+        let blocks = &places.blocks;
         for _ in 0..1 + random.below(4) {
             // Mostly in the blocks.
             let low = if random.below(4) == 0 { 12 } else { blocks[0].0 };
@@ -178,7 +198,7 @@ fn hostile_files_end_in_errors() {
             };
             put(&mut bytes, at, value);
         }
-        reseal(&mut bytes, counts, &blocks);
+        places.reseal(&mut bytes);
         match open(&bytes) {
             Err(_) => refused += 1,
             Ok(file) => {
@@ -196,8 +216,8 @@ fn hostile_files_end_in_errors() {
 #[test]
 fn needs_in_a_circle_are_found() {
     let mut bytes = small_file(1, false);
-    let blocks = blocks(&bytes);
-    let counts = [24, 32, 40, 48].map(|at| long(&bytes, at) as usize);
+    let places = Places::new(&bytes);
+    let blocks = &places.blocks;
     open(&bytes).unwrap().verify().unwrap();
     // With one level, a block is a node; w x y z are the four words before eps and the checksum.
     let adjacent = |block: usize| blocks[block].0 + blocks[block].1 - 4 - 4 - 16;
@@ -218,7 +238,7 @@ fn needs_in_a_circle_are_found() {
             break;
         }
     }
-    reseal(&mut bytes, counts, &blocks);
+    places.reseal(&mut bytes);
     let file = open(&bytes).unwrap();
     let error = file.verify().err().unwrap().to_string();
     assert!(error.contains("it needs itself, by way of others"), "{error}");
@@ -230,9 +250,9 @@ fn needs_in_a_circle_are_found() {
 fn the_magic_is_what_it_is() {
     assert_eq!(&MAGIC, b"FFXFMESH");
     let bytes = small_file(4, false);
-    assert_eq!((bytes[..8].to_vec(), word(&bytes, 8)), (MAGIC.to_vec(), 1));
-    assert_eq!(crc32fast::hash(&bytes), FROZEN, "version 1 is written differently from what it was");
+    assert_eq!((bytes[..8].to_vec(), word(&bytes, 8)), (MAGIC.to_vec(), 2));
+    assert_eq!(crc32fast::hash(&bytes), FROZEN, "version 2 is written differently from what it was");
 }
 
 /// Checksum of the file that a fixed log makes.
-const FROZEN: u32 = 2_979_780_395;
+const FROZEN: u32 = 1_901_165_696;

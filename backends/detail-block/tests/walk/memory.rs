@@ -5,7 +5,7 @@ use std::path::Path;
 use std::sync::atomic::AtomicBool;
 
 use detail_block::{Arrangement, BuildOptions, Workspace, XfmError, needed_bytes, write_within};
-use vertex_tree::{Collapse, CollapseLog, LogCounts, LogSource, Mesh, Records};
+use vertex_tree::{Collapse, CollapseLog, Georeference, LogCounts, LogSource, Mesh, Records};
 
 use crate::driver::bytes_of;
 use crate::meshes::{Random, grid, random_log, rubble, torus};
@@ -98,6 +98,9 @@ impl Broken<'_> {
 impl LogSource for Broken<'_> {
     fn counts(&self) -> LogCounts {
         self.0.counts()
+    }
+    fn georeference(&self) -> &Georeference {
+        self.0.georeference()
     }
     fn positions(&self) -> Records<'_, [f32; 3]> {
         self.cut(0, self.0.positions())

@@ -4,16 +4,17 @@
 //! ingoing arcs and the triangles are all in the order of the file, and are read side by side.
 
 use std::fs::File;
-use std::io::{self, BufWriter, Seek, SeekFrom, Write};
+use std::io::{self, Write};
 
 use vertex_tree::external::{Array, Paged, Reader, Sorter, Spool};
+use vertex_tree::sections::{BY_PAGE, Kind, SectionWriter};
 use vertex_tree::{Bounds, NONE};
 
 use super::arranging::{Arranged, bounds_of};
 use super::history::Fate;
 use super::versions::follow;
 use super::{Failure, Work, WriteReport};
-use crate::format::{Header, NODE, PARTITION, ROOT};
+use crate::format::{HEADER, Header};
 use crate::record::{Draft, Patch};
 use crate::{BuildOptions, QueueOrder};
 
@@ -51,13 +52,29 @@ pub(super) fn write(
         decreasing: u32::from(options.order == QueueOrder::Decreasing),
         ..Header::default()
     };
-    let mut out = BufWriter::with_capacity(1 << 18, file);
-    out.seek(SeekFrom::Start(header.tables_end())).map_err(Failure::Output)?;
+    let output = Failure::Output;
+    let kinds =
+        [(Kind::ROOTS, 0), (Kind::PARTITIONS, 0), (Kind::BASE, 0), (Kind::PAGES, BY_PAGE), (Kind::NODES, 0)];
+    let mut out =
+        SectionWriter::new(file, HEADER as u64, work.log.georeference(), &[], &kinds).map_err(output)?;
+    out.begin(Kind::ROOTS).map_err(output)?;
+    let mut roots = roots.into_iter().peekable();
+    for (n, node) in (0..).zip(nodes.read()?) {
+        let [_, bounds @ .., _] = node?;
+        if roots.next_if_eq(&n).is_some() {
+            put(&mut out, &[n])?;
+            put(&mut out, &bounds)?;
+        }
+    }
+    out.begin(Kind::PARTITIONS).map_err(output)?;
+    for first in partitions.read()? {
+        put(&mut out, &first?)?;
+    }
+    out.begin(Kind::BASE).map_err(output)?;
     let mut records = Records {
         positions: positions.into_paged(work.memory / 4)?,
         out: &mut out,
         record: Vec::new(),
-        bytes: header.tables_end(),
         arcs: Stream::new(arcs.read()?)?,
         ingoing: Stream::new(ingoing.read()?)?,
         nodes: nodes.read()?,
@@ -69,6 +86,7 @@ pub(super) fn write(
     base.sort_unstable();
     header.source_bytes = records.source(&source, &base)?;
     drop((source, base));
+    records.out.begin(Kind::PAGES).map_err(output)?;
     let outcome = triangles.finish(|[above, _, _, _, a, b, c]| {
         work.check()?;
         let outcome = records.nodes_before(above);
@@ -80,32 +98,15 @@ pub(super) fn write(
     }
     outcome?;
     records.nodes_before(count)?;
-    let Records { bytes, mut lengths, .. } = records;
+    let Records { mut lengths, .. } = records;
     largest_change(&mut header, &mut arcs, &mut ingoing, &mut lengths)?;
 
-    let output = Failure::Output;
-    out.seek(SeekFrom::Start(0)).map_err(output)?;
-    out.write_all(&header.encode()).map_err(output)?;
-    let mut table = Table::new(&mut out);
-    let mut roots = roots.into_iter().peekable();
-    for (n, node) in (0..).zip(nodes.read()?) {
-        let [_, bounds @ .., _] = node?;
-        if roots.next_if_eq(&n).is_some() {
-            table.push::<{ ROOT as usize }>(&[&[n], &bounds[..]].concat())?;
-        }
-    }
-    table.finish()?;
-    for first in partitions.read()? {
-        table.push::<{ PARTITION as usize }>(&first?)?;
-    }
-    table.finish()?;
+    out.begin(Kind::NODES).map_err(output)?;
     for (n, node) in nodes.read()?.enumerate() {
         let [collapse, ..] = node?;
-        table.push::<{ NODE as usize }>(&[lengths.get(n)?, collapse])?;
+        put(&mut out, &[lengths.get(n)?, collapse])?;
     }
-    table.finish()?;
-    debug_assert_eq!(out.stream_position().map_err(output)?, header.tables_end());
-    out.flush().map_err(output)?;
+    let bytes = out.finish(&header.encode()).map_err(output)?;
     Ok(WriteReport {
         triangles: counts.triangles,
         nodes: header.nodes,
@@ -236,10 +237,8 @@ impl<'f, const N: usize> Stream<'f, N> {
 /// Writes the records of nodes, one after the other.
 struct Records<'a, 'f> {
     positions: Paged<3>,
-    out: &'a mut BufWriter<&'f mut File>,
+    out: &'a mut SectionWriter<&'f mut File>,
     record: Vec<u8>,
-    /// Of the file so far.
-    bytes: u64,
     arcs: Stream<'a, 3>,
     ingoing: Stream<'a, 4>,
     nodes: Reader<'a, 7>,
@@ -311,7 +310,6 @@ impl Records<'_, '_> {
         let positions = &mut self.positions;
         draft.encode(|v| Ok(positions.get(v.into())?.map(f32::from_bits)), &mut self.record)?;
         self.out.write_all(&self.record).map_err(Failure::Output)?;
-        self.bytes += self.record.len() as u64;
         Ok(self.record.len() as u64)
     }
 }
@@ -327,28 +325,6 @@ fn patches<'a>(arcs: &[[u32; 2]], mut corners: &'a [[u32; 3]]) -> Vec<Patch<'a>>
         .collect()
 }
 
-/// A table that is being written, with its checksum behind it.
-struct Table<'a, 'f> {
-    out: &'a mut BufWriter<&'f mut File>,
-    checksum: crc32fast::Hasher,
-}
-
-impl<'a, 'f> Table<'a, 'f> {
-    fn new(out: &'a mut BufWriter<&'f mut File>) -> Self {
-        Self { out, checksum: crc32fast::Hasher::new() }
-    }
-
-    fn push<const BYTES: usize>(&mut self, words: &[u32]) -> Result<(), Failure> {
-        let mut bytes = [0; BYTES];
-        for (bytes, word) in bytes.chunks_exact_mut(4).zip(words) {
-            bytes.copy_from_slice(&word.to_le_bytes());
-        }
-        self.checksum.update(&bytes);
-        self.out.write_all(&bytes).map_err(Failure::Output)
-    }
-
-    fn finish(&mut self) -> Result<(), Failure> {
-        let checksum = std::mem::take(&mut self.checksum).finalize();
-        self.out.write_all(&checksum.to_le_bytes()).map_err(Failure::Output)
-    }
+fn put(out: &mut impl Write, words: &[u32]) -> Result<(), Failure> {
+    words.iter().try_for_each(|word| out.write_all(&word.to_le_bytes())).map_err(Failure::Output)
 }

@@ -25,6 +25,11 @@ impl FileSource {
         }
         Ok(Self { name: path.display().to_string(), file, len: metadata.len() })
     }
+
+    /// The file itself.
+    pub(crate) fn file(&self) -> &File {
+        &self.file
+    }
 }
 
 impl PageSource for FileSource {
