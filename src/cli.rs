@@ -6,6 +6,7 @@
 
 mod arguments;
 mod compare;
+mod destination;
 mod frame;
 mod hierarchy;
 mod input;
@@ -16,7 +17,6 @@ mod values;
 use std::io::Write;
 use std::process::ExitCode;
 
-use anyhow::Context;
 use clap::Parser;
 use clap::error::ErrorKind;
 
@@ -69,6 +69,11 @@ fn complain(what: &str) {
     let _ = writeln!(std::io::stderr(), "foldfront: {}", what.replace(['\n', '\r'], " "));
 }
 
+/// Says on standard error, in one line, what the user should know although nothing has failed.
+fn warn(what: &str) {
+    complain(&format!("warning: {what}"));
+}
+
 /// An error and its causes, but for those that it names itself.
 fn failure_line(error: &anyhow::Error) -> String {
     let mut line = error.to_string();
@@ -93,27 +98,6 @@ fn usage_line(error: &clap::Error) -> String {
 
 fn is_broken_pipe(cause: &(dyn std::error::Error + 'static)) -> bool {
     cause.downcast_ref::<std::io::Error>().is_some_and(|e| e.kind() == std::io::ErrorKind::BrokenPipe)
-}
-
-/// Whether a file could be written there: said before the work, not after it.
-fn check_writable(file: &std::path::Path) -> anyhow::Result<()> {
-    let folder = match file.parent() {
-        Some(parent) if !parent.as_os_str().is_empty() => parent,
-        _ => std::path::Path::new("."),
-    };
-    anyhow::ensure!(!file.is_dir(), "{}: is a folder", file.display());
-    // A rename would put a file in the place of /dev/null.
-    anyhow::ensure!(!file.exists() || file.is_file(), "{}: is not a file", file.display());
-    tempfile::tempfile_in(folder).with_context(|| file.display().to_string())?;
-    Ok(())
-}
-
-/// Whether files could be written to a folder, which is made when it is needed.
-fn check_folder(folder: &std::path::Path) -> anyhow::Result<()> {
-    let there = folder.ancestors().find(|f| f.exists()).unwrap_or(std::path::Path::new("."));
-    anyhow::ensure!(there.is_dir(), "{}: is not a folder", there.display());
-    tempfile::tempfile_in(there).with_context(|| folder.display().to_string())?;
-    Ok(())
 }
 
 /// Writes to standard output, whose reader may have gone.

@@ -20,6 +20,8 @@
 
 mod sample;
 
+use std::borrow::Cow;
+
 use glam::DVec3;
 use vertex_tree::Mesh;
 
@@ -74,7 +76,7 @@ pub struct Figures {
     pub p99: f64,
     /// The largest distance, in pixels.
     pub max: f64,
-    /// The sample that is so far off, in object space.
+    /// The sample that is so far off, in world coordinates.
     pub max_at: Option<[f64; 3]>,
 }
 
@@ -122,7 +124,9 @@ impl<'a> Reference<'a> {
     /// Measures how far `displayed` is from the original, in an image of `lines` lines.
     #[must_use]
     pub fn deviation(&self, displayed: &Mesh, camera: &Camera, lines: u32) -> Deviation {
-        let view = View::new(camera, lines, NEAR * self.extent);
+        let origin = self.mesh.georeference.origin;
+        let displayed = &*self.beside(displayed);
+        let view = View::new(&camera.relative_to(origin), lines, NEAR * self.extent);
         let seen = view.all_seen(displayed);
         let mut deviation = Deviation {
             lines,
@@ -134,13 +138,34 @@ impl<'a> Reference<'a> {
             reverse: Direction::default(),
         };
         self.reverse(displayed, &seen, &view, &mut deviation);
+        let Deviation { forward, reverse, .. } = &mut deviation;
+        for figures in [&mut forward.inner, &mut forward.border, &mut reverse.inner, &mut reverse.border] {
+            for (x, origin) in figures.max_at.iter_mut().flatten().zip(origin) {
+                *x += origin;
+            }
+        }
         deviation
+    }
+
+    /// A mesh about the origin of the original.
+    fn beside<'m>(&self, displayed: &'m Mesh) -> Cow<'m, Mesh> {
+        let (to, from) = (&self.mesh.georeference, &displayed.georeference);
+        if to.origin == from.origin {
+            return Cow::Borrowed(displayed);
+        }
+        let positions = displayed.positions.iter().map(|&p| to.local(from.world(p)).map(|x| x as f32));
+        Cow::Owned(Mesh {
+            positions: positions.collect(),
+            triangles: displayed.triangles.clone(),
+            georeference: to.clone(),
+        })
     }
 
     /// How many triangles of a mesh have any part in view.
     #[must_use]
     pub fn triangles_in_view(&self, displayed: &Mesh, camera: &Camera) -> usize {
-        count_in_view(&View::new(camera, 1, NEAR * self.extent).all_seen(displayed))
+        let camera = camera.relative_to(self.mesh.georeference.origin);
+        count_in_view(&View::new(&camera, 1, NEAR * self.extent).all_seen(&self.beside(displayed)))
     }
 
     fn forward(&self, displayed: &Mesh, seen: &[Seen], view: &View) -> Direction {

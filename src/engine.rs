@@ -169,7 +169,9 @@ pub struct Engine<T, M> {
     settings: Settings,
     odometer: Odometer,
     steering: Steering,
-    /// The views of the last frame, with the budget's factor applied, and room for the next.
+    /// What the tree's spheres and positions are relative to, in world coordinates.
+    origin: [f64; 3],
+    /// The views of the last frame, relative to the origin and with the budget's factor applied, and room for the next.
     before: Vec<View>,
     views: Vec<View>,
     kappa: f64,
@@ -210,6 +212,7 @@ impl<T: VertexTree, M: MeshSink> Engine<T, M> {
         }
         tree.base_mesh(&mut mesh)?;
         Ok(Self {
+            origin: tree.origin(),
             tree,
             mesh,
             front,
@@ -264,7 +267,12 @@ impl<T: VertexTree, M: MeshSink> Engine<T, M> {
         &self.front
     }
 
-    /// The views of the last frame, with the tolerance that a budget made of theirs.
+    /// World coordinates of what the displayed mesh and all spheres are relative to: that of the tree.
+    pub fn origin(&self) -> [f64; 3] {
+        self.origin
+    }
+
+    /// The views of the last frame, relative to the [`origin`](Self::origin), with the tolerance that a budget made of theirs.
     pub fn views(&self) -> &[View] {
         &self.views
     }
@@ -300,18 +308,35 @@ impl<T: VertexTree, M: MeshSink> Engine<T, M> {
         self.front.for_each_active(f);
     }
 
-    /// Moves the front to where these views want it. A node unfolds if any of them wants it: two for stereo, one
+    /// Moves the front to where these views of the world want it. A node unfolds if any of them wants it: two for stereo, one
     /// more for each shadow map. No view at all folds everything.
+    ///
+    /// Eyes are in world coordinates. The arithmetic is about the tree's [`origin`](Self::origin), which costs an eye at most
+    /// 2^-53 of its coordinates.
     ///
     /// # Errors
     /// What the backend reports; the front then is a valid one between the old and the new.
     pub fn advance(&mut self, views: &[View]) -> Result<FrameReport, TreeError> {
+        let origin = self.origin;
+        self.follow(views.iter().map(|view| view.relative_to(origin)))
+    }
+
+    /// As [`advance`](Self::advance), to views that are relative to the origin, as [`views`](Self::views) gives them.
+    ///
+    /// # Errors
+    /// What the backend reports.
+    pub fn advance_relative(&mut self, views: &[View]) -> Result<FrameReport, TreeError> {
+        self.follow(views.iter().copied())
+    }
+
+    fn follow(&mut self, views: impl Iterator<Item = View>) -> Result<FrameReport, TreeError> {
         let start = Instant::now();
         self.tree.begin_frame(&mut self.arrived)?;
 
         std::mem::swap(&mut self.before, &mut self.views);
         self.views.clear();
-        self.views.extend(views.iter().map(|view| view.coarser(self.steering.factor)));
+        let factor = self.steering.factor;
+        self.views.extend(views.map(|view| view.coarser(factor)));
 
         // While a budget steers, `k` has a speed. It is declared anew when the tolerance has moved far from where it
         // was declared; bounds that were computed with another speed do not hold then.

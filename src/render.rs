@@ -81,7 +81,8 @@ pub enum Shading {
 /// Draws what `camera` sees of `mesh`.
 #[must_use]
 pub fn render(mesh: &Mesh, camera: &Camera, style: &Style) -> Image {
-    let projection = Projection::new(camera, style, NEAR * mesh.extent());
+    let camera = camera.relative_to(mesh.georeference.origin);
+    let projection = Projection::new(&camera, style, NEAR * mesh.extent());
     let facets = facets(mesh, &projection, style, |_| IN_VIEW);
     Scene { facets, veils: Vec::new(), lines: Vec::new(), wires: style.wires }.draw(&projection)
 }
@@ -91,6 +92,7 @@ pub fn render(mesh: &Mesh, camera: &Camera, style: &Style) -> Image {
 #[must_use]
 pub fn render_outside(mesh: &Mesh, view: &Camera, style: &Style) -> Image {
     let bounds = mesh.bounding_box().unwrap_or_default();
+    let view = &view.relative_to(mesh.georeference.origin);
     let camera = outside_camera(view, bounds);
     let near = NEAR * mesh.extent();
     let projection = Projection::new(&camera, style, near);

@@ -58,6 +58,9 @@ impl<T: VertexTree> VertexTree for Settled<T> {
     fn displayed_triangles(&self) -> u64 {
         self.tree.displayed_triangles()
     }
+    fn origin(&self) -> [f64; 3] {
+        self.tree.origin()
+    }
     fn roots(&self) -> &[NodeId] {
         self.tree.roots()
     }

@@ -5,9 +5,9 @@ use glam::{DMat3, DQuat, DVec3};
 /// A perspective camera: as recorded in a path, and as a renderer has it.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Camera {
-    /// Eye position, in object space.
+    /// Eye position, in world coordinates.
     pub position: DVec3,
-    /// Rotation from camera space to object space. The camera looks along its -z with y up. A unit quaternion.
+    /// Rotation from camera space to the world. The camera looks along its -z with y up. A unit quaternion.
     pub orientation: DQuat,
     /// Full vertical field of view, in radians, above 0 and below pi.
     pub fov_y: f64,
@@ -24,6 +24,12 @@ impl Camera {
         let right = up.cross(back).try_normalize().unwrap_or_else(|| back.any_orthonormal_vector());
         let orientation = DQuat::from_mat3(&DMat3::from_cols(right, back.cross(right), back)).normalize();
         Self { position, orientation, fov_y, aspect }
+    }
+
+    /// The same camera in coordinates about `origin`, in which a mesh has its positions.
+    #[must_use]
+    pub fn relative_to(&self, origin: [f64; 3]) -> Self {
+        Self { position: self.position - DVec3::from(origin), ..*self }
     }
 
     /// Unit vector of the viewing direction.
@@ -60,7 +66,7 @@ pub fn theta_of_pixels(pixels: f64, lines: u32) -> f64 {
 /// `sqrt(2) fov / 2`, which is less than that for wide images.)
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct View {
-    /// Eye position, in object space.
+    /// Eye position: in world coordinates for an engine, in those of the spheres for the criterion.
     pub eye: DVec3,
     /// Unit vector of the viewing direction.
     pub direction: DVec3,
@@ -89,6 +95,13 @@ impl View {
             sin_beta: tan_beta / secant,
             k: (1.0 / (tan_half_fov * theta)).max(1.0),
         }
+    }
+
+    /// The same view in coordinates about `origin`, in which a tree has its spheres.
+    #[must_use]
+    pub fn relative_to(mut self, origin: [f64; 3]) -> Self {
+        self.eye -= DVec3::from(origin);
+        self
     }
 
     /// The same view with its tolerance multiplied by `factor`.

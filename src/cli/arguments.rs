@@ -220,6 +220,9 @@ pub(super) struct Compare {
     /// Full speed of turning in radians a frame; by default the path's 99th percentile.
     #[arg(long, value_parser = positive)]
     pub omega: Option<f64>,
+    /// Join near components of meshes that are simplified for this, as with `build`.
+    #[arg(long)]
+    pub merge_components: bool,
     /// Compare every frame's cut with that of the other strategies and with the brute-force oracle.
     #[arg(long)]
     pub check: bool,

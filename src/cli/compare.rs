@@ -7,6 +7,7 @@ use anyhow::{Context, Result, bail};
 use vertex_tree::Mesh;
 
 use super::arguments::Compare;
+use super::destination::check_folder;
 use super::input::{Input, Replayable};
 use super::print;
 use super::progress::stage;
@@ -30,7 +31,13 @@ pub(super) fn compare(command: &Compare) -> Result<()> {
     let paths: Vec<Path> = command.path.iter().map(|file| Path::read(file)).collect::<Result<_, _>>()?;
     let options = options(command);
     // Before the work, not after it.
-    super::check_folder(&command.out)?;
+    let mut files: Vec<_> = inputs.iter().flat_map(Input::files).collect();
+    files.extend_from_slice(&command.path);
+    let is_written = |name: &str| {
+        ["frames.csv", "summary.csv", "report.html"].contains(&name)
+            || name.starts_with("selection-") && name.ends_with(".svg")
+    };
+    check_folder(&command.out, is_written, &files)?;
 
     let arguments: Vec<String> = std::env::args().skip(1).collect();
     let made_by = format!("foldfront {}", arguments.join(" "));
@@ -40,7 +47,8 @@ pub(super) fn compare(command: &Compare) -> Result<()> {
             report.sections.push(objects(command, file, &name, &paths, &options)?);
             continue;
         }
-        let subjects = input.replayable(&name, &command.backend, &BuildOptions::from(&command.storage))?;
+        let storage = BuildOptions::from(&command.storage);
+        let subjects = input.replayable(&name, &command.backend, &storage, command.merge_components)?;
         let walks = walks(input, &subjects, &paths)?;
         let is_alone = subjects.len() == 1;
         for subject in subjects {

@@ -6,6 +6,7 @@ use anyhow::{Context, Result, bail};
 use vertex_tree::Mesh;
 
 use super::arguments::{Deviation, Export, LINES, Refinement, Render};
+use super::destination::{Content, check_file};
 use super::input::{Input, Replayable};
 use super::print;
 use super::progress::stage;
@@ -35,8 +36,15 @@ fn check_frame(path: &Path, frame: usize) -> Result<()> {
 /// The one thing that the arguments name.
 fn subject(arguments: &[String]) -> Result<Replayable> {
     let input = Input::one(arguments)?;
-    let mut all = input.replayable(&input.name(), &[], &BuildOptions::default())?;
+    let mut all = input.replayable(&input.name(), &[], &BuildOptions::default(), false)?;
     all.pop().context("one backend is one subject")
+}
+
+/// Whether the picture or mesh of a frame may be written there.
+fn check_output(output: &std::path::Path, content: Content, frame: &super::arguments::FrameOf) -> Result<()> {
+    let mut inputs = Input::one(&frame.file)?.files();
+    inputs.push(frame.path.clone());
+    check_file(output, content, &inputs)
 }
 
 /// The refined mesh of a frame, and its camera.
@@ -49,14 +57,14 @@ fn frame_mesh(frame: &super::arguments::FrameOf) -> Result<(Mesh, Camera)> {
 }
 
 pub(super) fn export(command: &Export) -> Result<()> {
-    super::check_writable(&command.output)?;
+    check_output(&command.output, Content::Mesh, &command.frame)?;
     let (mesh, _) = frame_mesh(&command.frame)?;
     crate::mesh_io::write_ply(&command.output, &mesh, None)?;
     print(&format!("{}: {} triangles\n", command.output.display(), mesh.triangles.len()))
 }
 
 pub(super) fn render(command: &Render) -> Result<()> {
-    super::check_writable(&command.output)?;
+    check_output(&command.output, Content::Picture, &command.frame)?;
     let (mesh, camera) = frame_mesh(&command.frame)?;
     let style = Style { width: command.width, wires: command.wire, ..Style::default() };
     let image = if command.outside {

@@ -9,6 +9,7 @@ use serde_json::json;
 use vertex_tree::{CollapseLog, DegreeMap, Georeference, LogFile, Mesh, log_file_version, read_log};
 
 use super::arguments::{Build, Info, Verify};
+use super::destination::{Content, check_file};
 use super::input::Input;
 use super::print;
 use super::progress::stage;
@@ -19,10 +20,10 @@ use crate::store::{self, Backend, BuildOptions, Store, WriteLimits};
 
 pub(super) fn build(command: &Build) -> Result<()> {
     let input = Input::one(&command.input)?;
-    super::check_writable(&command.output)?;
+    check_file(&command.output, Content::Hierarchy(command.backend), &input.files())?;
     if let Some(memory) = command.memory {
         return match &input {
-            Input::Meshes(files) => print(&describe(&build_within(&input.name(), files, memory, command)?)),
+            Input::Meshes(files) => tell(&build_within(&input.name(), files, memory, command)?),
             Input::Log(file) => {
                 let log = LogFile::open(file)?;
                 let limits = write_limits(memory, command)?;
@@ -38,7 +39,7 @@ pub(super) fn build(command: &Build) -> Result<()> {
         store::write(command.backend, &command.output, &log, &options)
     })?;
     if let Some(report) = report {
-        print(&describe(&report))?;
+        tell(&report)?;
     }
     Ok(())
 }
@@ -103,10 +104,62 @@ fn build_within(name: &str, files: &[PathBuf], memory: u64, command: &Build) -> 
     Ok(report)
 }
 
+/// What a simplification did, and what the user should know of it.
+fn tell(report: &simplify::Report) -> Result<()> {
+    print(&describe(report))?;
+    warn_of_rounding(&report.georeference);
+    if HUNDREDTH * report.base_triangles > report.triangles {
+        super::warn(&why_left(report));
+    }
+    Ok(())
+}
+
+/// A share of which there are so many.
+const HUNDREDTH: usize = 100;
+
+/// Says that positions are too coarse for the mesh, where they are.
+fn warn_of_rounding(georeference: &Georeference) {
+    let rounding = georeference.rounding;
+    if let Some(share) = rounding.share().filter(|share| share * HUNDREDTH as f64 > 1.0) {
+        super::warn(&format!(
+            "32 bits about the middle do not hold the coordinates: they move by up to {}, which is {share:.2} of the median edge",
+            rounding.largest_move
+        ));
+    }
+}
+
+/// Why so much of a mesh is left.
+fn why_left(report: &simplify::Report) -> String {
+    let remains = report.remains;
+    let mut why = Vec::new();
+    if remains.components > 1 {
+        let joined = "(--merge-components joins them)";
+        why.push(format!("{} components keep at least one each {joined}", remains.components));
+    }
+    if remains.held_by_topology > 0 {
+        let count = remains.held_by_topology;
+        why.push(format!("{count} vertices can not go without a change of topology"));
+    }
+    if remains.held_by_orientation > 0 {
+        let count = remains.held_by_orientation;
+        why.push(format!("{count} can not go without turning a triangle over"));
+    }
+    format!(
+        "{} of {} triangles remain in the base mesh: {}",
+        report.base_triangles,
+        report.triangles,
+        why.join(", ")
+    )
+}
+
 /// What a simplification did, in lines.
 fn describe(report: &simplify::Report) -> String {
     let time = report.preparation + report.simplification + report.conclusion;
-    format!(
+    let rounding = report.georeference.rounding;
+    let moved = rounding.share().map_or_else(String::new, |share| {
+        format!("largest move         {} ({share:.1e} of the median edge)\n", rounding.largest_move)
+    });
+    let text = format!(
         "triangles            {}\ncollapses            {}\nrounds               {}\nroots                {}\n\
          depth                {}\ndependency depth     {}\nbase triangles       {}\nlargest error        {}\n\
          order inversions     {}\nmicroseconds a triangle  {:.2}\n",
@@ -120,12 +173,15 @@ fn describe(report: &simplify::Report) -> String {
         report.largest_eps,
         report.inversions,
         time.as_secs_f64() * 1e6 / report.triangles.max(1) as f64,
-    )
+    );
+    text + &moved
 }
 
 pub(super) fn info(command: &Info) -> Result<()> {
     if let Input::Stored(file) = Input::one(&[command.file.display().to_string()])? {
-        let facts = Store::open(&file)?.facts();
+        let store = Store::open(&file)?;
+        warn_of_rounding(&store.georeference());
+        let facts = store.facts();
         if command.json {
             let value: serde_json::Map<_, _> =
                 facts.into_iter().map(|(name, value)| (name.replace(' ', "_"), value.into())).collect();
@@ -140,6 +196,7 @@ pub(super) fn info(command: &Info) -> Result<()> {
     let roots = forest.roots().count();
     let largest = log.collapses.iter().map(|c| c.bounds.eps).fold(0.0, f32::max);
     let georeference = &log.mesh.georeference;
+    warn_of_rounding(georeference);
     let per_triangle = bytes as f64 / log.mesh.triangles.len().max(1) as f64;
     if command.json {
         let mut value = json!({

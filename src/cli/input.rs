@@ -76,6 +76,20 @@ impl Input {
         }
     }
 
+    /// The files that it is read from.
+    pub fn files(&self) -> Vec<PathBuf> {
+        match self {
+            Self::Scene(_) => Vec::new(),
+            Self::Log(path) | Self::Stored(path) => vec![path.clone()],
+            Self::Objects(path) => {
+                // A scene file that can not be read is complained about when it is opened.
+                let objects = crate::objects::read_scene(path).unwrap_or_default();
+                objects.into_iter().map(|(file, _)| file).chain([path.clone()]).collect()
+            }
+            Self::Meshes(paths) => paths.clone(),
+        }
+    }
+
     /// A short name for tables and file names.
     pub fn name(&self) -> String {
         let stem =
@@ -130,10 +144,15 @@ impl Input {
 /// The backend whose hierarchy a file starts like, if it does.
 fn backend_of(path: &Path) -> Result<Option<Backend>> {
     let named = || path.display().to_string();
-    let mut file = std::fs::File::open(path).with_context(named)?;
-    if file.metadata().with_context(named)?.is_dir() {
+    let metadata = std::fs::metadata(path).with_context(named)?;
+    if metadata.is_dir() {
         bail!("{}: is a folder", path.display());
     }
+    // Inputs are opened more than once: what has been read from a pipe is gone.
+    if !metadata.is_file() {
+        bail!("{}: is not a file", path.display());
+    }
+    let mut file = std::fs::File::open(path).with_context(named)?;
     let mut start = [0; 8];
     match file.read_exact(&mut start) {
         Ok(()) => Ok(Backend::of_magic(start)),
@@ -159,12 +178,14 @@ pub(super) struct Replayable {
 }
 
 impl Input {
-    /// Opens the input under a name in each of these backends; in its own, if there are none.
+    /// Opens the input under a name in each of these backends; in its own, if there are none. A mesh is simplified for that,
+    /// with components merged if that is asked for.
     pub fn replayable(
         &self,
         name: &str,
         backends: &[Backend],
         options: &BuildOptions,
+        merge_components: bool,
     ) -> Result<Vec<Replayable>> {
         if let Self::Stored(path) = self {
             let store = Store::open(path)?;
@@ -186,7 +207,7 @@ impl Input {
                 folder,
             }]);
         }
-        let (log, built) = self.log(false)?;
+        let (log, built) = self.log(merge_components)?;
         let log = Arc::new(log);
         let backends = if backends.is_empty() { &[Backend::InMemory] } else { backends };
         let open = |&backend: &Backend| {

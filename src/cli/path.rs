@@ -5,6 +5,7 @@ use std::fmt::Write;
 use anyhow::{Context, Result};
 
 use super::arguments::{PathCommand, PathSubcommand};
+use super::destination::{Content, check_file};
 use super::input::Input;
 use super::print;
 use super::progress::stage;
@@ -22,8 +23,11 @@ pub(super) fn path(command: &PathCommand) -> Result<()> {
             print(&text)
         }
         PathSubcommand::Import { trajectory, fit, output, mode, rate } => {
-            super::check_writable(output)?;
-            let mesh = Input::one(fit)?.mesh()?;
+            let fit = Input::one(fit)?;
+            let mut inputs = fit.files();
+            inputs.push(trajectory.clone());
+            check_file(output, Content::Path, &inputs)?;
+            let mesh = fit.mesh()?;
             let options = import::Options { mode: (*mode).into(), rate: *rate, ..import::Options::default() };
             let path = import::import(trajectory, &mesh, &options)?;
             path.write(output)?;

@@ -161,7 +161,7 @@ impl Replay<'_> {
         let mut rows = rows.iter_mut();
         let mut active: FxHashSet<NodeId> = FxHashSet::default();
         self.run(tree, NullSink, |_, engine, _| {
-            exact.advance(engine.views()).map_err(wrap)?;
+            exact.advance_relative(engine.views()).map_err(wrap)?;
             let mut wrong = 0;
             if exact.front().cut_hash() != engine.front().cut_hash() {
                 active.clear();

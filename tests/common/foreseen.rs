@@ -27,6 +27,9 @@ impl<T: VertexTree> VertexTree for Foreseen<T> {
     fn displayed_triangles(&self) -> u64 {
         self.tree.displayed_triangles()
     }
+    fn origin(&self) -> [f64; 3] {
+        self.tree.origin()
+    }
     fn roots(&self) -> &[NodeId] {
         self.tree.roots()
     }

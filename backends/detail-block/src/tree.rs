@@ -154,6 +154,10 @@ impl VertexTree for XfmTree {
         self.displayed
     }
 
+    fn origin(&self) -> [f64; 3] {
+        self.file().georeference().origin
+    }
+
     fn roots(&self) -> &[NodeId] {
         &self.roots
     }

@@ -57,6 +57,8 @@ pub struct Hierarchy {
     pub(crate) triangles: Vec<LeafTriangle>,
     /// How many triangles some node brings.
     pub(crate) refining: u32,
+    /// World coordinates of what all positions are relative to.
+    pub(crate) origin: [f64; 3],
 }
 
 /// Leaves of a log, depth-first.
@@ -178,6 +180,7 @@ impl Hierarchy {
         let base = roots.iter().map(|&id| nodes[id as usize].kept);
         let base = base.chain(lone.map(|(vertex, _): (u32, _)| leaves.of_vertex[vertex as usize]));
         let mut hierarchy = Self {
+            origin: log.mesh.georeference.origin,
             parents: order.iter().map(|&n| numbered(forest.parent[n as usize])).collect(),
             root_bounds: roots.iter().map(|&id| bounds(nodes[id as usize].log_number)).collect(),
             base_vertices: base.map(|leaf| (leaf, position(input_vertex[leaf as usize]))).collect(),

@@ -65,6 +65,10 @@ impl VertexTree for InMemoryTree {
         self.displayed
     }
 
+    fn origin(&self) -> [f64; 3] {
+        self.hierarchy.origin
+    }
+
     fn roots(&self) -> &[NodeId] {
         &self.hierarchy.roots
     }

@@ -183,6 +183,10 @@ impl VertexTree for MetaNodeTree {
         self.displayed
     }
 
+    fn origin(&self) -> [f64; 3] {
+        self.file().georeference().origin
+    }
+
     fn roots(&self) -> &[NodeId] {
         &self.roots
     }

@@ -148,6 +148,10 @@ impl VertexTree for MtTree {
         self.displayed
     }
 
+    fn origin(&self) -> [f64; 3] {
+        self.file.georeference().origin
+    }
+
     fn roots(&self) -> &[NodeId] {
         &self.file.roots
     }

@@ -27,6 +27,14 @@ pub struct Rounding {
     pub median_edge: f64,
 }
 
+impl Rounding {
+    /// The largest move as a share of the median edge; `None` where nothing was rounded.
+    #[must_use]
+    pub fn share(&self) -> Option<f64> {
+        (self.largest_move > 0.0).then(|| self.largest_move / self.median_edge)
+    }
+}
+
 /// An equirectangular map of degrees to metres, x to the east and y to the north:
 /// `x = (longitude - self.longitude) * metres_per_degree[0]`, `y = (latitude - self.latitude) * metres_per_degree[1]`.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
@@ -67,7 +75,9 @@ impl Georeference {
             facts.push(("degrees", format!("from {longitude} {latitude}, {a} {b} metres each")));
         }
         if self.rounding != Rounding::default() {
-            facts.push(("largest move", self.rounding.largest_move.to_string()));
+            let share =
+                self.rounding.share().map_or_else(String::new, |s| format!(" ({s:.1e} of the median edge)"));
+            facts.push(("largest move", format!("{}{share}", self.rounding.largest_move)));
             facts.push(("median edge", self.rounding.median_edge.to_string()));
         }
         facts

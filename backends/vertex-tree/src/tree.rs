@@ -148,6 +148,10 @@ pub trait VertexTree {
     fn node_limit(&self) -> u32;
     /// How many triangles are displayed now; known also where the sink does not keep the mesh.
     fn displayed_triangles(&self) -> u64;
+    /// World coordinates of the place that all positions and spheres are relative to. Views are brought there.
+    fn origin(&self) -> [f64; 3] {
+        [0.0; 3]
+    }
     /// The inner nodes that have no structural parent.
     fn roots(&self) -> &[NodeId];
     /// Sphere and error of a node, as stored: strategies and the brute-force oracle read the same.
