@@ -3,6 +3,7 @@
 mod common;
 
 use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::{Duration, Instant};
 
 use common::{Front, Random, bytes, frame, holder_bytes, random_log};
@@ -157,7 +158,8 @@ fn dropping_a_tree_never_hangs() {
 /// A store that panics is a store that fails.
 #[test]
 fn a_panic_in_the_store_is_a_fault() {
-    struct Panics(MemorySource);
+    /// Panics once it is told to.
+    struct Panics(MemorySource, AtomicBool);
     impl PageSource for Panics {
         fn name(&self) -> &str {
             self.0.name()
@@ -166,11 +168,13 @@ fn a_panic_in_the_store_is_a_fault() {
             self.0.len()
         }
         fn read_at(&self, offset: u64, buffer: &mut [u8]) -> std::io::Result<()> {
-            assert!(offset < 1000, "on purpose");
+            assert!(!self.1.load(Ordering::Relaxed), "on purpose");
             self.0.read_at(offset, buffer)
         }
     }
-    let file = file(Panics(source(30, 1)));
+    let panics = Arc::new(Panics(source(30, 1), AtomicBool::new(false)));
+    let file = file(panics.clone());
+    panics.1.store(true, Ordering::Relaxed);
     let mut tree = MetaNodeTree::new(file, Settings::default()).unwrap();
     tree.load_all();
     tree.settle().unwrap();
