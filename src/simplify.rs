@@ -1,4 +1,22 @@
 //! Builds the hierarchy: simplifies a mesh in memory and records every step.
+//!
+//! Why it ends, whatever the mesh:
+//!
+//! * A round (`rounds`) takes up each candidate once. A round that collapses leaves a vertex less, so there are fewer such
+//!   rounds than vertices.
+//! * Between two collapses there are at most [`MOST_IDLE`](stall::MOST_IDLE) rounds, and then as many as there are candidates:
+//!   after a round that changed no node, key or state, and after `MOST_IDLE` rounds without a collapse whatever they have
+//!   changed, each round gives up the candidates that come up in vain. At least one does, as the limit of a round is the key
+//!   of a candidate; and one that has been given up comes up no more before there is another collapse.
+//! * When no candidate is left, the vertices without a legal edge are looked at once more, then the reach for other components
+//!   is doubled up to a limit, then triangles may turn further, once. Each happens once between two collapses at most.
+//! * A vertex with thousands of triangles does not make rounds of its own: several collapses of a round may follow one
+//!   another there, as long as it only loses triangles (`Builder::may_follow`).
+//!
+//! Out of core the rounds are passes, and end as they do in memory (`out_of_core`).
+//!
+//! Legality (`legality`), measured errors (`samples`) and keys are in terms of a star's own edges and of the median edge:
+//! nothing depends on where the mesh lies, or on what else there is.
 
 mod ball;
 mod candidates;
@@ -79,6 +97,9 @@ pub struct Report {
     pub collapses: usize,
     /// Rounds of independent collapses, in order.
     pub rounds: Vec<Round>,
+    /// Collapses that depend on another of their round: those at vertices with very many triangles, of which a round may take
+    /// away more than one.
+    pub followers: usize,
     /// Rounds in all, with those in which candidates were found illegal or dearer than they seemed, and none was collapsed.
     pub attempted_rounds: usize,
     /// Roots of the forest.
@@ -181,6 +202,7 @@ pub fn build(mesh: Mesh, options: &Options, progress: Progress) -> Result<(Colla
         triangles: log.mesh.triangles.len(),
         collapses: log.collapses.len(),
         rounds,
+        followers: nodes.followers,
         attempted_rounds,
         roots: forest.roots().count(),
         tree_depth: forest.depth(),

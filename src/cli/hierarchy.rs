@@ -106,11 +106,12 @@ fn build_within(name: &str, files: &[PathBuf], memory: u64, command: &Build) -> 
 
 /// What a simplification did, and what the user should know of it.
 fn tell(report: &simplify::Report) -> Result<()> {
-    print(&describe(report))?;
-    warn_of_rounding(&report.georeference);
+    let mut text = describe(report);
     if HUNDREDTH * report.base_triangles > report.triangles {
-        super::warn(&why_left(report));
+        let _ = writeln!(text, "{}", why_left(report));
     }
+    print(&text)?;
+    warn_of_rounding(&report.georeference);
     Ok(())
 }
 
@@ -144,12 +145,8 @@ fn why_left(report: &simplify::Report) -> String {
         let count = remains.held_by_orientation;
         why.push(format!("{count} can not go without turning a triangle over"));
     }
-    format!(
-        "{} of {} triangles remain in the base mesh: {}",
-        report.base_triangles,
-        report.triangles,
-        why.join(", ")
-    )
+    let share = 100.0 * report.base_triangles as f64 / report.triangles as f64;
+    format!("{share:.1} % of the triangles remain in the base mesh: {}", why.join(", "))
 }
 
 /// What a simplification did, in lines.

@@ -49,6 +49,8 @@ pub(super) struct Nodes {
     pub next_id: u32,
     /// The number in the whole construction of the round's first node.
     pub first_of_round: u32,
+    /// Nodes that depend on another of their round.
+    pub followers: usize,
     /// For each node, the number of edges on the longest way down to a leaf.
     pub height: Vec<u32>,
     /// For each node, the length of the longest chain of predecessors down to the input, counting itself.
@@ -73,6 +75,7 @@ impl Nodes {
             ids: None,
             next_id: 0,
             first_of_round: 0,
+            followers: 0,
             height: Vec::with_capacity(leaf_radius.len()),
             depth: Vec::with_capacity(leaf_radius.len()),
             top: vec![NONE; leaf_radius.len()],
@@ -134,7 +137,7 @@ impl Nodes {
             self.predecessors.sort_unstable();
             self.predecessors.dedup();
         }
-        let (mut eps, mut depth, mut key) = (error, 0, key);
+        let (mut eps, mut depth, mut key, mut follows) = (error, 0, key, false);
         for &node in &self.predecessors {
             let b = self.collapses[node as usize].bounds;
             self.balls.push(Ball { center: b.center.map(f64::from).into(), radius: f64::from(b.radius) });
@@ -142,6 +145,7 @@ impl Nodes {
             depth = depth.max(self.depth[node as usize]);
             if self.is_from(node, self.first_of_round) {
                 key = key.max(self.keys[node as usize]);
+                follows = true;
             }
         }
         let center = enclosing_center(&mut self.balls).as_vec3();
@@ -163,6 +167,7 @@ impl Nodes {
             ids.push(self.next_id);
         }
         self.next_id += 1;
+        self.followers += usize::from(follows);
         self.height.push(height + 1);
         self.depth.push(depth + 1);
         self.keys.push(key);

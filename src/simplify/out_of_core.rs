@@ -199,6 +199,7 @@ pub fn build_within(
         loaded: 0,
         roots: 0,
         remains: super::Remains::default(),
+        followers: 0,
         rounds: 0,
     };
     passes.begin().map_err(temporary)?;
@@ -226,6 +227,7 @@ pub fn build_within(
         triangles: triangles as usize,
         collapses: collapses as usize,
         rounds: std::mem::take(&mut log.rounds),
+        followers: passes.followers,
         attempted_rounds: passes.rounds,
         roots: passes.roots,
         tree_depth: log.tree_depth,

@@ -3,6 +3,8 @@
 mod backends;
 mod commands;
 mod comparison;
+mod destinations;
 mod failures;
 mod memory;
 mod workplace;
+mod world;

@@ -69,6 +69,7 @@ pub(super) struct Totals<'p> {
     pub vanished: usize,
     pub roots: usize,
     pub remains: Remains,
+    pub followers: usize,
 }
 
 impl Pass<'_> {
@@ -112,6 +113,7 @@ impl Pass<'_> {
         totals.loaded += window.vertices() as u64;
         totals.collapses += collapses;
         totals.vanished += self.whole.live_triangles - builder.surface.live_triangles;
+        totals.followers += builder.nodes.followers;
         totals.changed |= builder.candidates.changed;
         totals.roots += roots;
         totals.remains.held_by_topology += remains.held_by_topology;

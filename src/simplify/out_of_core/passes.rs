@@ -50,6 +50,8 @@ pub(super) struct Passes<'a> {
     pub roots: usize,
     /// Why these are left.
     pub remains: Remains,
+    /// Collapses that depend on another of their round.
+    pub followers: usize,
     /// Rounds, with those without a collapse.
     pub rounds: usize,
 }
@@ -113,6 +115,7 @@ impl Passes<'_> {
             },
         )?;
         self.remains = window.builder.remains();
+        self.followers += window.builder.nodes.followers;
         let (live, top) = (&window.builder.surface.live, &window.builder.nodes.top);
         self.live = live.len();
         self.roots = live.iter().filter(|&&v| top[v as usize] != NONE).count();
@@ -152,6 +155,7 @@ impl Passes<'_> {
             vanished: 0,
             roots: 0,
             remains: Remains::default(),
+            followers: 0,
         };
         let pass = Pass {
             work,
@@ -197,6 +201,7 @@ impl Passes<'_> {
         self.windows += totals.windows;
         self.loaded += totals.loaded;
         self.roots += totals.roots;
+        self.followers += totals.followers;
         self.remains.held_by_topology += totals.remains.held_by_topology;
         self.remains.held_by_orientation += totals.remains.held_by_orientation;
         self.whole.live_triangles -= totals.vanished;
