@@ -68,7 +68,10 @@ mod tests {
         let here = around(&mesh);
         mesh.georeference = Georeference { origin: [5e5, 5.4e6, 300.0], ..Georeference::default() };
         let there = around(&mesh);
-        assert_eq!(mesh.world_box(), Some(([500_001.0, 5_400_002.0, 303.0], [500_005.0, 5_400_008.0, 303.5])));
+        assert_eq!(
+            mesh.world_box(),
+            Some(([500_001.0, 5_400_002.0, 303.0], [500_005.0, 5_400_008.0, 303.5]))
+        );
         for (here, there) in here.frames.iter().zip(&there.frames) {
             let moved = there.position - here.position;
             assert!(moved.distance(DVec3::new(5e5, 5.4e6, 300.0)) < 2e-9);

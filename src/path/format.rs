@@ -248,7 +248,11 @@ impl Line<'_> {
     /// Radians; `value` is what stands in the file.
     fn check_fov(self, fov_y: f64, value: &str) -> Result<(), PathError> {
         let fits = fov_y > 0.0 && fov_y < std::f64::consts::PI;
-        if fits { Ok(()) } else { Err(self.header_out_of_range("fov", value, "above 0 and below 180 degrees")) }
+        if fits {
+            Ok(())
+        } else {
+            Err(self.header_out_of_range("fov", value, "above 0 and below 180 degrees"))
+        }
     }
 
     fn check_aspect(self, aspect: f64, value: &str) -> Result<(), PathError> {
