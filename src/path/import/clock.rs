@@ -32,10 +32,12 @@ const LARGEST_SECONDS: f64 = 1e11;
 const EPOCH: [f64; 2] = [1e8, 1e10];
 /// The year 2000: beyond it hardly a clock that counts from when a machine was started is taken for one from 1970.
 const RECENT: f64 = 9.4e8;
-/// Seconds between samples: most of a clock that might be another, most of one that stands beyond 2000, and from how
-/// many on clocks of seconds get a word, or none if their times are whole numbers, as those of finer units are.
+/// Seconds between samples: most of a clock that might be another, and most of one that stands beyond 2000.
 const CLOSE: f64 = 10.0;
 const FAR: f64 = 3600.0;
+/// Seconds between samples from which clocks of seconds are in doubt: where positions on earth are recorded, which is
+/// done ten times a second at most, and elsewhere. Beyond the last no whole numbers are taken for seconds.
+const DOUBTFUL_ON_EARTH: f64 = 100.0;
 const DOUBTFUL: f64 = 10.0;
 const ABSURD: f64 = 1e4;
 
@@ -60,11 +62,13 @@ impl<'a> Clock<'a> {
         Ok(())
     }
 
-    /// The first time, and those since, in seconds. `said` is the unit of the header, if it has one.
+    /// The first time, and those since, in seconds. `said` is the unit of the header, if it has one; `on_earth`
+    /// says that positions are in degrees.
     pub fn seconds(
         mut self,
         file: &FilePath,
         said: Option<f64>,
+        on_earth: bool,
         warn: &mut dyn FnMut(Warning),
     ) -> Result<(f64, Vec<f64>), ImportError> {
         let step = median_step(&self.elapsed);
@@ -90,7 +94,7 @@ impl<'a> Clock<'a> {
                         "can not be in seconds, with {step} from sample to sample: {ASK}"
                     )));
                 }
-                if step >= DOUBTFUL {
+                if step >= if on_earth { DOUBTFUL_ON_EARTH } else { DOUBTFUL } {
                     warn(Warning::Seconds { file: file.to_owned(), step });
                 }
                 1.0
@@ -156,7 +160,8 @@ mod tests {
             clock.read(at, time).unwrap();
         }
         let mut warnings = 0;
-        let found = clock.seconds(file, said, &mut |_| warnings += 1).map_err(|error| error.to_string());
+        let found =
+            clock.seconds(file, said, false, &mut |_| warnings += 1).map_err(|error| error.to_string());
         (found, warnings)
     }
 

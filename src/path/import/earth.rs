@@ -98,6 +98,6 @@ mod tests {
         let position = Plane::OfMesh(map).position(at, [52.0, 179.0, 3.0]).unwrap();
         assert_eq!(position, DVec3::new(-20.0, 20.0, 3.0));
         let error = Plane::AtFirst(None).position(at, [91.0, 0.0, 0.0]).unwrap_err();
-        assert_eq!(error.to_string(), "t:7: 91 is no latitude in degrees");
+        assert_eq!(error.to_string(), "t:7: 91.0 is no latitude in degrees");
     }
 }

@@ -69,7 +69,7 @@ pub enum ImportError {
         reason: String,
     },
     /// A latitude is beyond the poles, or a longitude beyond once around.
-    #[error("{}:{line}: {value} is no {name} in degrees", file.display())]
+    #[error("{}:{line}: {value:?} is no {name} in degrees", file.display())]
     Degrees {
         /// The trajectory.
         file: PathBuf,
@@ -81,7 +81,7 @@ pub enum ImportError {
         value: f64,
     },
     /// The lens of a `.frames` file gives no field of view.
-    #[error("{}:{line}: {value} is no tan of half a field of view of 0.01 to 179 degrees", file.display())]
+    #[error("{}:{line}: {value:?} is no tan of half a field of view of 0.01 to 179 degrees", file.display())]
     Lens {
         /// The trajectory.
         file: PathBuf,

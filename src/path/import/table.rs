@@ -50,7 +50,7 @@ pub(super) fn read<'a>(
     let Some(clock) = clock.filter(|_| frames > 1) else {
         return Err(ImportError::TooShort { file: file.to_owned(), frames });
     };
-    let (start, times) = clock.seconds(file, layout.per_second, warn)?;
+    let (start, times) = clock.seconds(file, layout.per_second, layout.geographic.is_some(), warn)?;
     for (sample, time) in samples.iter_mut().zip(times) {
         sample.time = time;
     }
