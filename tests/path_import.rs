@@ -195,6 +195,7 @@ fn what_is_unclear_is_an_error_with_its_line() {
             "t.csv:1: something of latitude and longitude is said",
         ),
         ("t[furlong] x y z\n0 1 2 3\n", "t.csv:1: \"t[furlong]\": no unit \"furlong\" of a time is known"),
+        ("t (min),x,y,z\n0,1,2,3\n", "t.csv:1: \"t(min)\": no unit \"min\" of a time is known"),
         ("t,x,y,z\n0,1,2,3\n1,1,,3\n", "t.csv:3: column 3 is empty"),
         ("0,1,2,3\n1,1,,3\n", "t.csv:2: column 3 is empty"),
         ("0,1,2,3\n1,1,2,\n", "t.csv:2: column 4 is empty"),

@@ -32,7 +32,9 @@ const LARGEST_SECONDS: f64 = 1e11;
 const EPOCH: [f64; 2] = [1e8, 1e10];
 /// The year 2000: beyond it hardly a clock that counts from when a machine was started is taken for one from 1970.
 const RECENT: f64 = 9.4e8;
-/// Seconds between samples: most of a clock that might be another, and most of one that stands beyond 2000.
+/// Seconds between samples: least where the header says the unit, most of a clock that might be another, and most of one
+/// that stands beyond 2000.
+const CLOSEST: f64 = 1e-6;
 const CLOSE: f64 = 10.0;
 const FAR: f64 = 3600.0;
 /// Seconds between samples from which clocks of seconds are in doubt: where positions on earth are recorded, which is
@@ -85,6 +87,12 @@ impl<'a> Clock<'a> {
                 return Err(unclear(format!(
                     "can not be in the unit of the header: no clock stands at {:e} s",
                     largest / unit
+                )));
+            }
+            Some(unit) if step / unit < CLOSEST => {
+                let step = step / unit;
+                return Err(unclear(format!(
+                    "can not be in the unit of the header, with {step:e} s from sample to sample"
                 )));
             }
             Some(unit) => unit,
@@ -194,6 +202,7 @@ mod tests {
                 "t:1: the time 50000000000000 is too large for seconds",
             ),
             (["1e30", "2e30"], None, "too large"),
+            (["1403636579.7", "1403636579.8"], Some(1e9), "1e-10 s from sample to sample"),
             (["1403636579763", "1403636579863"], Some(1.0), "can not be in the unit of the header"),
             // Three weeks of microseconds, or a day in 2029 with a sample each half hour?
             (["500000000000000", "500000100000000"], None, "no time since 1970"),

@@ -60,95 +60,23 @@ pub(super) struct Name {
 }
 
 /// What says that an axis is of something else than the place or the rotation.
-const OTHER: &[&str] = &[
-    "a",
-    "acc",
-    "accel",
-    "acceleration",
-    "agl",
-    "angular",
-    "b",
-    "bias",
-    "cov",
-    "covariance",
-    "d",
-    "delta",
-    "dev",
-    "dir",
-    "direction",
-    "err",
-    "error",
-    "forward",
-    "ground",
-    "gyro",
-    "home",
-    "linear",
-    "look",
-    "lookat",
-    "mag",
-    "omega",
-    "rate",
-    "ref",
-    "rel",
-    "relative",
-    "scale",
-    "setpoint",
-    "sigma",
-    "speed",
-    "std",
-    "stddev",
-    "takeoff",
-    "target",
-    "twist",
-    "v",
-    "var",
-    "variance",
-    "vel",
-    "velocity",
-];
-const ROTATION: &[&str] =
-    &["q", "quat", "quaternion", "orientation", "ori", "orient", "rot", "rotation", "att", "attitude"];
-const PLACE: &[&str] =
-    &["t", "p", "pos", "position", "trans", "translation", "loc", "location", "point", "coord", "eye"];
+const OTHER: &str = "a acc accel acceleration agl angular b bias cov covariance d delta dev dir direction err error \
+    forward ground gyro home linear look lookat mag omega rate ref rel relative scale setpoint sigma \
+    speed std stddev takeoff target twist v var variance vel velocity";
+const ROTATION: &str = "q quat quaternion orientation ori orient rot rotation att attitude";
+const PLACE: &str = "t p pos position trans translation loc location point coord eye";
 /// What says nothing.
-const FRAME: &[&str] =
-    &["pose", "camera", "cam", "enu", "local", "utm", "world", "odom", "map", "body", "base", "robot"];
-const CLOCK: &[&str] = &["t", "time", "timestamp", "timestamps", "times", "stamp"];
-const CLOCK_TOO: &[&str] = &[
-    "clock", "elapsed", "epoch", "field", "gps", "header", "posix", "ros", "system", "unix", "utc", "since",
-    "start", "of", "day", "sensor", "image", "frame",
-];
-const HEIGHT: &[&str] = &["alt", "altitude", "height", "hgt", "ele", "elev", "elevation"];
-const UNITS: &[&str] = &[
-    "s",
-    "sec",
-    "secs",
-    "seconds",
-    "ms",
-    "msec",
-    "millis",
-    "milliseconds",
-    "us",
-    "usec",
-    "micros",
-    "microseconds",
-    "ns",
-    "nsec",
-    "nanos",
-    "nanoseconds",
-    "m",
-    "meters",
-    "metres",
-    "mm",
-    "cm",
-    "km",
-    "ft",
-    "feet",
-    "deg",
-    "degrees",
-    "rad",
-    "radians",
-];
+const FRAME: &str = "pose camera cam enu local utm world odom map body base robot";
+const CLOCK: &str = "t time timestamp timestamps times stamp";
+const CLOCK_TOO: &str =
+    "clock elapsed epoch field gps header posix ros system unix utc since start of day sensor image frame";
+const HEIGHT: &str = "alt altitude height hgt ele elev elevation";
+const UNITS: &str = "s sec secs seconds ms msec millis milliseconds us usec micros microseconds ns nsec nanos nanoseconds \
+    m meters metres mm cm km ft feet deg degrees rad radians";
+
+fn listed(list: &str, word: &str) -> bool {
+    list.split(' ').any(|listed| listed == word)
+}
 
 impl Name {
     /// `text` is the name with its unit in brackets, if any.
@@ -156,16 +84,16 @@ impl Name {
         let (name, bracket) = text.split_once(['[', '(']).unwrap_or((text, ""));
         let mut words = words(name);
         let mut unit = bracket.trim_end_matches([']', ')']).trim().to_lowercase();
-        if words.len() > 1
-            && unit.is_empty()
-            && words.last().is_some_and(|word| UNITS.contains(&word.as_str()))
-        {
+        if words.len() > 1 && unit.is_empty() && words.last().is_some_and(|word| listed(UNITS, word)) {
             unit = words.pop().unwrap_or_default();
         }
-        // What stands in round brackets may also be a remark, and no unit is a number of none.
+        // What stands in round brackets may also be a remark, such as `(MSL)` or `(UTC)`; a time in minutes has none.
         let role = role(&words);
-        let known = role.is_none_or(|(role, _)| role.factor(&unit).is_some());
-        if matches!(unit.as_str(), "-" | "1") || (text.contains('(') && !known) {
+        let remark = text.contains('(')
+            && role.is_none_or(|(role, _)| {
+                role.factor(&unit).is_none() && (role != Role::Time || listed(CLOCK_TOO, &unit))
+            });
+        if matches!(unit.as_str(), "-" | "1") || remark {
             unit.clear();
         }
         // A column that is called by its unit.
@@ -201,24 +129,24 @@ pub(super) fn words(name: &str) -> Vec<String> {
 }
 
 fn role(words: &[String]) -> Option<(Role, u8)> {
-    let any = |list: &[&str]| words.iter().any(|word| list.contains(&word.as_str()));
+    let any = |list| words.iter().any(|word| listed(list, word));
     let [.., last] = words else { return None };
     let last = last.as_str();
     let plain = u8::from(words.len() > 1);
-    if words.iter().all(|word| CLOCK.contains(&word.as_str()) || CLOCK_TOO.contains(&word.as_str())) {
-        let said = any(CLOCK) || any(&["epoch", "elapsed", "clock"]);
+    if words.iter().all(|word| listed(CLOCK, word) || listed(CLOCK_TOO, word)) {
+        let said = any(CLOCK) || any("epoch elapsed clock");
         return said.then_some((Role::Time, plain));
     }
-    if any(&["roll", "pitch", "yaw"]) && !any(OTHER) {
+    if any("roll pitch yaw") && !any(OTHER) {
         return Some((Role::Attitude, plain));
     }
     if any(OTHER) {
         return None;
     }
-    if any(&["lat", "latitude"]) || last.ends_with("latitude") {
+    if any("lat latitude") || last.ends_with("latitude") {
         return Some((Role::Latitude, plain));
     }
-    if any(&["lon", "lng", "long", "longitude"]) || last.ends_with("longitude") {
+    if any("lon lng long longitude") || last.ends_with("longitude") {
         return Some((Role::Longitude, plain));
     }
     if any(HEIGHT) || last.ends_with("altitude") {
@@ -243,8 +171,8 @@ fn axis(words: &[String]) -> Option<(Role, u8)> {
         }
         let at = word.char_indices().next_back()?.0;
         let (prefix, axis) = word.split_at(at);
-        let rotation = ROTATION.contains(&prefix);
-        return (rotation || PLACE.contains(&prefix))
+        let rotation = listed(ROTATION, prefix);
+        return (rotation || listed(PLACE, prefix))
             .then(|| of_axis(axis, rotation))
             .flatten()
             .map(|role| (role, 0));
@@ -259,9 +187,9 @@ fn axis(words: &[String]) -> Option<(Role, u8)> {
                 .map(|(role, _)| (role, 1));
         }
     };
-    let any = |list: &[&str]| rest.iter().any(|word| list.contains(&word.as_str()));
+    let any = |list| rest.iter().any(|word| listed(list, word));
     let rotation = any(ROTATION);
-    let known = rotation || any(PLACE) || rest.iter().all(|word| FRAME.contains(&word.as_str()));
+    let known = rotation || any(PLACE) || rest.iter().all(|word| listed(FRAME, word));
     known.then(|| of_axis(axis, rotation)).flatten().map(|role| (role, u8::from(rest.len() > 1)))
 }
 
