@@ -1,8 +1,9 @@
 //! Walkthroughs: a camera recorded frame by frame.
 //!
 //! A path file is text in the order of the TUM RGB-D benchmark, one frame a line, `t x y z qx qy qz qw`: seconds,
-//! eye position in object space, and the rotation from camera space (looking along -z, y up) to object space. Lines
-//! that start with `#` before the frames are the header. See [`Path::parse`].
+//! eye position in world coordinates (object space, unless the mesh has a georeference), and the rotation from camera
+//! space (looking along -z, y up) to object space. Lines that start with `#` before the frames are the header. See
+//! [`Path::parse`].
 
 mod around;
 mod director;
@@ -10,6 +11,7 @@ mod format;
 mod generate;
 pub mod import;
 mod summary;
+mod text;
 
 use glam::{DQuat, DVec3};
 
@@ -41,7 +43,7 @@ pub struct Path {
 pub struct Pose {
     /// Seconds.
     pub time: f64,
-    /// Eye position, in object space.
+    /// Eye position, in world coordinates: object space plus the origin of the mesh's georeference.
     pub position: DVec3,
     /// Rotation from camera space to object space; the camera looks along its -z with y up.
     pub orientation: DQuat,

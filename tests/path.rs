@@ -330,7 +330,8 @@ mod importing {
                 for mode in [Mode::Fly, Mode::Walk, Mode::Orbit] {
                     // The flight lasts ten hours.
                     let rate = if trajectory.to_str().unwrap().contains("soaring") { 5.0 } else { 60.0 };
-                    let path = import(trajectory, mesh, &Options { mode, rate, up: None }).unwrap();
+                    let path =
+                        import(trajectory, mesh, &Options { mode, rate, ..Options::default() }).unwrap();
                     let Summary { motion: [_, usual, largest], .. } = path.summary();
                     let what = format!("{} {mode:?} {}", path.name, mesh.positions.len());
                     assert!(path.frames.len() > 900, "{what}");

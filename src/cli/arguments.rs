@@ -291,8 +291,11 @@ pub(super) enum PathSubcommand {
         files: Vec<PathBuf>,
     },
     /// Bring a recorded trajectory to a mesh: scaled, placed, oriented and resampled.
+    ///
+    /// Times may be in seconds, or since 1970 in milli-, micro- or nanoseconds; a header may name columns and units. The
+    /// path is in world coordinates.
     Import {
-        /// TUM, KITTI (converted), Hoppe .frames, or positions only.
+        /// TUM, KITTI (converted), EuRoC and other tables with a header, Hoppe .frames, or positions only.
         trajectory: PathBuf,
         /// The mesh or scene or hierarchy that the path is for.
         #[arg(long, required = true, num_args = 1..)]
@@ -306,6 +309,10 @@ pub(super) enum PathSubcommand {
         /// Frames a second.
         #[arg(long, default_value = "60", value_parser = positive)]
         rate: f64,
+        /// Keep place, scale and time: metres are the mesh's world coordinates, latitudes and longitudes are where the mesh
+        /// has them.
+        #[arg(long, conflicts_with = "mode")]
+        no_fit: bool,
     },
 }
 

@@ -22,15 +22,24 @@ pub(super) fn path(command: &PathCommand) -> Result<()> {
             }
             print(&text)
         }
-        PathSubcommand::Import { trajectory, fit, output, mode, rate } => {
+        PathSubcommand::Import { trajectory, fit, output, mode, rate, no_fit } => {
             let fit = Input::one(fit)?;
             let mut inputs = fit.files();
             inputs.push(trajectory.clone());
             check_file(output, Content::Path, &inputs)?;
             let mesh = fit.mesh()?;
-            let options = import::Options { mode: (*mode).into(), rate: *rate, ..import::Options::default() };
-            let path = import::import(trajectory, &mesh, &options)?;
+            let options = import::Options {
+                mode: (*mode).into(),
+                rate: *rate,
+                fit: !no_fit,
+                ..import::Options::default()
+            };
+            let mut warnings = Vec::new();
+            let path = import::import_warning(trajectory, &mesh, &options, &mut |w| warnings.push(w))?;
             path.write(output)?;
+            for warning in warnings {
+                super::warn(&warning);
+            }
             let mut text = String::new();
             describe(&mut text, &path);
             print(&text)

@@ -12,12 +12,13 @@ const FOV_Y: f64 = std::f64::consts::FRAC_PI_3;
 const ASPECT: f64 = 16.0 / 9.0;
 
 /// Twelve seconds around a mesh, looking at its middle: from a distance of one and a half times its extent to where
-/// it fills the view and more, then on at that distance. A flat mesh is taken for terrain, seen from above with z up;
+/// it fills the view and more, then on at that distance, in world coordinates. A flat mesh is taken for terrain, seen from above with z up;
 /// anything else has y up, as scans do.
 #[must_use]
 pub fn around(mesh: &Mesh) -> Path {
     let (lo, hi) = mesh.bounding_box().unwrap_or_default();
     let (lo, hi) = (DVec3::from(lo.map(f64::from)), DVec3::from(hi.map(f64::from)));
+    let origin = DVec3::from(mesh.georeference.origin);
     let (center, size) = ((lo + hi) / 2.0, hi - lo);
     let extent = if mesh.extent() > 0.0 { mesh.extent() } else { 1.0 };
     let flat = size.z < 0.3 * size.x.min(size.y);
@@ -33,7 +34,7 @@ pub fn around(mesh: &Mesh) -> Path {
             let outwards = ahead * angle.cos() + side * angle.sin();
             let position = center + (outwards + up * height).normalize() * distance;
             let camera = Camera::look_at(position, center, up, FOV_Y, ASPECT);
-            Pose { time: frame as f64 / RATE, position, orientation: camera.orientation }
+            Pose { time: frame as f64 / RATE, position: origin + position, orientation: camera.orientation }
         })
         .collect();
     Path { name: "around".to_owned(), units: "units".to_owned(), fov_y: FOV_Y, aspect: ASPECT, frames }
@@ -41,6 +42,8 @@ pub fn around(mesh: &Mesh) -> Path {
 
 #[cfg(test)]
 mod tests {
+    use vertex_tree::Georeference;
+
     use super::*;
 
     #[test]
@@ -56,6 +59,23 @@ mod tests {
             let to_center = (DVec3::new(3.0, 5.0, 6.0) - camera.position).normalize();
             assert!(camera.direction().dot(to_center) > 1.0 - 1e-9);
             assert!(camera.up().dot(DVec3::Y) > 0.5);
+        }
+    }
+
+    #[test]
+    fn a_mesh_elsewhere_has_the_same_path_there() {
+        let mut mesh = Mesh { positions: vec![[1.0, 2.0, 3.0], [5.0, 8.0, 3.5]], ..Mesh::default() };
+        let here = around(&mesh);
+        mesh.georeference = Georeference { origin: [5e5, 5.4e6, 300.0], ..Georeference::default() };
+        let there = around(&mesh);
+        assert_eq!(
+            mesh.world_box(),
+            Some(([500_001.0, 5_400_002.0, 303.0], [500_005.0, 5_400_008.0, 303.5]))
+        );
+        for (here, there) in here.frames.iter().zip(&there.frames) {
+            let moved = there.position - here.position;
+            assert!(moved.distance(DVec3::new(5e5, 5.4e6, 300.0)) < 2e-9);
+            assert_eq!(there.orientation, here.orientation);
         }
     }
 }

@@ -7,13 +7,13 @@ use std::path::{Path as FilePath, PathBuf};
 use glam::{DQuat, DVec3};
 use thiserror::Error;
 
-use super::{Path, Pose};
+use super::{Path, Pose, text};
 
 /// Why a path could not be read or written. Lines count from 1.
 #[derive(Debug, Error)]
 #[non_exhaustive]
 pub enum PathError {
-    /// The file could not be read, or is not UTF-8 text.
+    /// The file could not be read, or is UTF-16 text.
     #[error("{}: {source}", file.display())]
     Read {
         /// The file.
@@ -102,11 +102,9 @@ pub enum PathError {
 }
 
 impl Path {
-    /// Reads a path file.
+    /// Reads a path file. Comments may be in any encoding that has ASCII in it; what is not UTF-8 is taken for Latin-1.
     pub fn read(file: &FilePath) -> Result<Self, PathError> {
-        let text = std::fs::read_to_string(file)
-            .map_err(|source| PathError::Read { file: file.to_owned(), source })?;
-        Self::parse(file, &text)
+        Self::parse(file, &text::read(file)?)
     }
 
     /// Reads the text of a path file; `file` names it in errors.
@@ -128,11 +126,8 @@ impl Path {
         let stem = file.file_stem().map_or_else(String::new, |stem| stem.to_string_lossy().into_owned());
         let mut path =
             Self { name: stem, units: "units".to_owned(), fov_y: 0.0, aspect: 0.0, frames: Vec::new() };
-        // Some editors begin text with a byte order mark.
-        let text = text.strip_prefix('\u{feff}').unwrap_or(text);
-        for (index, content) in text.lines().enumerate() {
+        for (index, content) in text::lines(text).enumerate() {
             let at = Line { file, line: index + 1 };
-            let content = content.trim();
             if let Some(comment) = content.strip_prefix('#') {
                 at.header(comment.trim(), &mut path)?;
             } else if !content.is_empty() {
@@ -181,9 +176,43 @@ impl Path {
     }
 
     /// Writes a path file, under a temporary name first.
+    ///
+    /// # Errors
+    /// What [`Path::read`] would refuse is not written; the line is the one that it would have in the file.
     pub fn write(&self, file: &FilePath) -> Result<(), PathError> {
+        self.check(file)?;
         crate::output::write(file, self.to_text().as_bytes())
             .map_err(|source| PathError::Write { file: file.to_owned(), source })
+    }
+}
+
+/// Line of the field of view in what is written; the aspect is on the next, the first frame behind the names of columns.
+const FOV_LINE: usize = 4;
+
+impl Path {
+    /// Whether [`Path::to_text`] is what [`Path::parse`] takes.
+    fn check(&self, file: &FilePath) -> Result<(), PathError> {
+        let at = |line| Line { file, line };
+        at(FOV_LINE).check_fov(self.fov_y, &format!("{} rad", self.fov_y))?;
+        at(FOV_LINE + 1).check_aspect(self.aspect, &self.aspect.to_string())?;
+        let mut previous = None;
+        for (index, &Pose { time, position: p, orientation }) in self.frames.iter().enumerate() {
+            let at = at(FOV_LINE + 3 + index);
+            let quaternion = orientation.to_array();
+            for number in [time].into_iter().chain(p.to_array()).chain(quaternion) {
+                if !number.is_finite() {
+                    return Err(at.not_a_number(&number.to_string()));
+                }
+            }
+            at.rotation(quaternion)?;
+            if let Some(previous) = previous.replace(time) {
+                at.check_time(time, previous)?;
+            }
+        }
+        if self.frames.is_empty() {
+            return Err(PathError::NoFrames { file: file.to_owned() });
+        }
+        Ok(())
     }
 }
 
@@ -198,13 +227,6 @@ impl Line<'_> {
     fn header(self, comment: &str, path: &mut Path) -> Result<(), PathError> {
         let (key, value) = comment.split_once(char::is_whitespace).unwrap_or((comment, ""));
         let value = value.trim();
-        let out_of_range = |key, range| PathError::Header {
-            file: self.file.to_owned(),
-            line: self.line,
-            key,
-            value: value.to_owned(),
-            range,
-        };
         match key {
             "name" if !value.is_empty() => value.clone_into(&mut path.name),
             "units" if !value.is_empty() => value.clone_into(&mut path.units),
@@ -212,31 +234,49 @@ impl Line<'_> {
                 let (number, unit) = value.split_once(char::is_whitespace).unwrap_or((value, ""));
                 let number: f64 = number.parse().unwrap_or(f64::NAN);
                 path.fov_y = if unit.trim() == "rad" { number } else { number.to_radians() };
-                if !(path.fov_y > 0.0 && path.fov_y < std::f64::consts::PI) {
-                    return Err(out_of_range("fov", "above 0 and below 180 degrees"));
-                }
+                self.check_fov(path.fov_y, value)?;
             }
             "aspect" => {
                 path.aspect = value.parse().unwrap_or(f64::NAN);
-                if !(path.aspect > 0.0 && path.aspect.is_finite()) {
-                    return Err(out_of_range("aspect", "a finite number above 0"));
-                }
+                self.check_aspect(path.aspect, value)?;
             }
             _ => {}
         }
         Ok(())
     }
 
+    /// Radians; `value` is what stands in the file.
+    fn check_fov(self, fov_y: f64, value: &str) -> Result<(), PathError> {
+        let fits = fov_y > 0.0 && fov_y < std::f64::consts::PI;
+        if fits {
+            Ok(())
+        } else {
+            Err(self.header_out_of_range("fov", value, "above 0 and below 180 degrees"))
+        }
+    }
+
+    fn check_aspect(self, aspect: f64, value: &str) -> Result<(), PathError> {
+        let fits = aspect > 0.0 && aspect.is_finite();
+        if fits { Ok(()) } else { Err(self.header_out_of_range("aspect", value, "a finite number above 0")) }
+    }
+
+    fn header_out_of_range(self, key: &'static str, value: &str, range: &'static str) -> PathError {
+        let (file, line) = (self.file.to_owned(), self.line);
+        PathError::Header { file, line, key, value: value.to_owned(), range }
+    }
+
+    fn not_a_number(self, value: &str) -> PathError {
+        PathError::Number { file: self.file.to_owned(), line: self.line, value: value.to_owned() }
+    }
+
+    /// A finite number.
+    pub fn number(self, value: &str) -> Result<f64, PathError> {
+        value.parse().ok().filter(|x: &f64| x.is_finite()).ok_or_else(|| self.not_a_number(value))
+    }
+
     /// The numbers of a line.
     pub fn numbers(self, content: &str) -> Result<Vec<f64>, PathError> {
-        let number = |value: &str| {
-            value.parse().ok().filter(|x: &f64| x.is_finite()).ok_or_else(|| PathError::Number {
-                file: self.file.to_owned(),
-                line: self.line,
-                value: value.to_owned(),
-            })
-        };
-        content.split_whitespace().map(number).collect()
+        content.split_whitespace().map(|value| self.number(value)).collect()
     }
 
     /// `t x y z qx qy qz qw`.

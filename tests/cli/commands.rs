@@ -273,3 +273,33 @@ fn nobody_to_complain_to_is_no_panic() {
         assert_eq!(status.code(), Some(code), "{arguments}");
     }
 }
+
+#[test]
+fn a_trajectory_is_kept_where_it_was_recorded() {
+    let place = Workplace::new();
+    place.write("near.csv", "time[ms],x,y,z\n0,0.5,0,2\n100,0.6,0,2\n200,0.7,0,2\n");
+    let said = place.succeed("path import near.csv --fit grid.ply --no-fit -o near.path --rate 10");
+    assert!(said.starts_with("near: 3 frames, 0.2 s, 0.2 units; "), "{said}");
+    let positions = Path::read(&place.file("near.path")).unwrap().frames;
+    assert_eq!(positions[1].position.to_array(), [0.6, 0.0, 2.0]);
+
+    place.write("far.csv", "t,x,y,z\n0,500,0,2\n1,501,0,2\n");
+    let output = place.run("path import far.csv --fit grid.ply --no-fit -o far.path");
+    let complaint = String::from_utf8(output.stderr).unwrap();
+    assert!(output.status.success() && place.file("far.path").exists(), "{complaint}");
+    let said = "foldfront: warning: far.csv: no camera is near the mesh: the path is in [500, 0, 2] to [501, 0, 2], the mesh in [-1, -1, ";
+    assert!(complaint.starts_with(said) && complaint.lines().count() == 1, "{complaint}");
+
+    place.write("degrees.csv", "t,lat,lon,alt\n0,47,13,500\n1,47.1,13,500\n");
+    place.fail(
+        "path import degrees.csv --fit grid.ply --no-fit -o d.path",
+        1,
+        &["degrees.csv: ", "no map of them"],
+    );
+    place.fail("path import near.csv --no-fit -o d.path", 2, &["--fit"]);
+    place.fail(
+        "path import near.csv --fit grid.ply --no-fit --mode walk -o d.path",
+        2,
+        &["--no-fit", "--mode"],
+    );
+}

@@ -30,6 +30,13 @@ impl Mesh {
         }))
     }
 
+    /// The corners of the [bounding box](Self::bounding_box) in world coordinates.
+    #[must_use]
+    pub fn world_box(&self) -> Option<([f64; 3], [f64; 3])> {
+        let (lo, hi) = self.bounding_box()?;
+        Some((self.georeference.world(lo), self.georeference.world(hi)))
+    }
+
     /// Length of the diagonal of the bounding box; 0 for a mesh without vertices.
     #[must_use]
     pub fn extent(&self) -> f64 {

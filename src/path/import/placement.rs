@@ -5,8 +5,9 @@ use std::f64::consts::{FRAC_PI_2, PI};
 use glam::{DQuat, DVec2, DVec3};
 use vertex_tree::Mesh;
 
+use super::axes::look;
 use super::envelope::Envelope;
-use super::trajectory::{Sample, look};
+use super::trajectory::Sample;
 use super::{Mode, Up};
 use crate::path::Pose;
 
@@ -23,6 +24,8 @@ pub(super) struct Ground {
     high: DVec3,
     /// From z up to the mesh's own axes.
     to_mesh: DQuat,
+    /// Of the mesh in the world.
+    origin: DVec3,
     envelope: Envelope,
 }
 
@@ -30,8 +33,7 @@ impl Ground {
     pub fn new(mesh: &Mesh, up: Option<Up>) -> Self {
         let (low, high) = mesh.bounding_box().unwrap_or_default();
         let [low, high] = [low, high].map(|p| DVec3::from_array(p.map(f64::from)));
-        let size = high - low;
-        let up = up.unwrap_or(if size.z < FLAT * size.x.min(size.y) { Up::Z } else { Up::Y });
+        let up = up_of(mesh, up);
         let turned = |p: DVec3| match up {
             Up::Z => p,
             Up::Y => DVec3::new(p.x, -p.z, p.y),
@@ -45,7 +47,8 @@ impl Ground {
         Self {
             low,
             high,
-            to_mesh: if up == Up::Y { DQuat::from_rotation_x(-FRAC_PI_2) } else { DQuat::IDENTITY },
+            to_mesh: to_mesh(mesh, Some(up)),
+            origin: mesh.georeference.origin.into(),
             envelope: Envelope::new(low, high, triangles),
         }
     }
@@ -78,7 +81,22 @@ impl Ground {
     }
 }
 
-/// Frames from samples at a steady rate. Positions are rounded to below a ten-millionth of the mesh's diagonal, times
+/// Which axis of a mesh points up, if nobody says it.
+fn up_of(mesh: &Mesh, up: Option<Up>) -> Up {
+    let (low, high) = mesh.bounding_box().unwrap_or_default();
+    let size = DVec3::from_array(high.map(f64::from)) - DVec3::from_array(low.map(f64::from));
+    up.unwrap_or(if size.z < FLAT * size.x.min(size.y) { Up::Z } else { Up::Y })
+}
+
+/// From z up to the axes of a mesh.
+pub(super) fn to_mesh(mesh: &Mesh, up: Option<Up>) -> DQuat {
+    match up_of(mesh, up) {
+        Up::Y => DQuat::from_rotation_x(-FRAC_PI_2),
+        Up::Z => DQuat::IDENTITY,
+    }
+}
+
+/// Frames from samples at a steady rate, in world coordinates. Positions are rounded to below a ten-millionth of the mesh's diagonal, times
 /// and quaternions like those of recorded paths.
 pub(super) fn place(samples: &[Sample], ground: &Ground, mode: Mode, rate: f64) -> Vec<Pose> {
     let positions = match mode {
@@ -98,18 +116,29 @@ pub(super) fn place(samples: &[Sample], ground: &Ground, mode: Mode, rate: f64) 
     while unit * 1e-7 * ground.size().length() < 1.0 && unit < 1e15 {
         unit *= 10.0;
     }
-    let round = |x: f64, unit: f64| (x * unit).round() / unit + 0.0;
+    // Rounded about the mesh, so that the path of a mesh elsewhere is the same path there.
+    let rounded = |p: DVec3| DVec3::from((ground.to_mesh * p).to_array().map(|x| round(x, unit)));
+    let positions = positions.into_iter().map(|p| ground.origin + rounded(p));
+    let times = samples.iter().map(|sample| sample.time);
+    let orientations = orientations.into_iter().map(|orientation| ground.to_mesh * orientation);
+    frames(times.zip(positions).zip(orientations))
+}
+
+/// Frames of times, positions and orientations, with times and quaternions rounded like those of recorded paths.
+pub(super) fn frames(samples: impl Iterator<Item = ((f64, DVec3), DQuat)>) -> Vec<Pose> {
     let mut last = DQuat::IDENTITY;
-    let pose = |((sample, position), orientation): ((&Sample, DVec3), DQuat)| {
-        let orientation = (ground.to_mesh * orientation).normalize();
+    let pose = |((time, position), orientation): ((f64, DVec3), DQuat)| {
+        let orientation = orientation.normalize();
         last = if last.dot(orientation) < 0.0 { -orientation } else { orientation };
-        Pose {
-            time: round(sample.time, 1e6),
-            position: (ground.to_mesh * position).to_array().map(|x| round(x, unit)).into(),
-            orientation: DQuat::from_array(last.to_array().map(|x| round(x, 1e9))),
-        }
+        let orientation = DQuat::from_array(last.to_array().map(|x| round(x, 1e9)));
+        Pose { time: round(time, 1e6), position, orientation }
     };
-    samples.iter().zip(positions).zip(orientations).map(pose).collect()
+    samples.map(pose).collect()
+}
+
+/// Adding 0 turns -0 into 0.
+fn round(x: f64, unit: f64) -> f64 {
+    (x * unit).round() / unit + 0.0
 }
 
 /// The box of the trajectory.
@@ -265,7 +294,7 @@ fn moving_average(values: &[f64], half: usize) -> Vec<f64> {
 /// Orientation from motion, for recordings of positions: along the way from two seconds before to four after, without
 /// banking, `down` (a slope) below it. Climbs and dives steeper than a third are not followed. Where the camera hardly
 /// moves it keeps its direction.
-fn ahead(positions: &[DVec3], rate: f64, down: f64) -> Vec<DQuat> {
+pub(super) fn ahead(positions: &[DVec3], rate: f64, down: f64) -> Vec<DQuat> {
     let (before, after) = ((2.0 * rate) as usize, (4.0 * rate).ceil() as usize);
     let chord =
         |i: usize| positions[(i + after).min(positions.len() - 1)] - positions[i.saturating_sub(before)];
