@@ -38,7 +38,7 @@ pub(super) fn path(command: &PathCommand) -> Result<()> {
             let path = import::import_warning(trajectory, &mesh, &options, &mut |w| warnings.push(w))?;
             path.write(output)?;
             for warning in warnings {
-                super::warn(&warning);
+                super::warn(&warning.to_string());
             }
             let mut text = String::new();
             describe(&mut text, &path);
