@@ -67,14 +67,15 @@ fn info_says_where_a_mesh_lies_in_the_world() {
     log.mesh.georeference = vertex_tree::Georeference {
         origin: [691_000.5, 5_334_000.0, 0.0],
         coordinate_system: "EPSG:25832".to_owned(),
-        rounding: vertex_tree::Rounding { largest_move: 0.125, median_edge: 2.5 },
+        rounding: vertex_tree::Rounding { largest_move: 0.0125, median_edge: 2.5 },
         ..Default::default()
     };
     vertex_tree::write_log(&place.file("there.log"), &log).unwrap();
     let lines = [
         "origin 691000.5 5334000 0",
         "coordinate system EPSG:25832",
-        "largest move 0.125",
+        "largest move 0.0125",
+        "of the median edge 5.0e-3",
         "median edge 2.5",
     ];
     for (backend, version) in [
@@ -100,7 +101,7 @@ fn info_says_where_a_mesh_lies_in_the_world() {
     let json: Value = serde_json::from_str(&place.succeed("info there.log --json")).unwrap();
     assert_eq!(json["origin"], Value::from(vec![691_000.5, 5_334_000.0, 0.0]));
     assert_eq!(json["bounding_box"][0], Value::from(vec![690_999.5, 5_333_999.0, 0.0]));
-    assert_eq!([&json["largest_move"], &json["median_edge"]], [0.125, 2.5]);
+    assert_eq!([&json["largest_move"], &json["median_edge"]], [0.0125, 2.5]);
     assert!(place.succeed("info there.log").contains("[690999.5, 5333999.0, 0.0]"));
 }
 

@@ -75,9 +75,10 @@ impl Georeference {
             facts.push(("degrees", format!("from {longitude} {latitude}, {a} {b} metres each")));
         }
         if self.rounding != Rounding::default() {
-            let share =
-                self.rounding.share().map_or_else(String::new, |s| format!(" ({s:.1e} of the median edge)"));
-            facts.push(("largest move", format!("{}{share}", self.rounding.largest_move)));
+            facts.push(("largest move", self.rounding.largest_move.to_string()));
+            if let Some(share) = self.rounding.share() {
+                facts.push(("of the median edge", format!("{share:.1e}")));
+            }
             facts.push(("median edge", self.rounding.median_edge.to_string()));
         }
         facts
