@@ -158,7 +158,9 @@ fn positions(kind: Kind, count: u32, random: &mut Random) -> Vec<[f32; 3]> {
     let thrown = |random: &mut Random| [(); 3].map(|()| random.unit() * SIDE);
     let side = f64::from(count.isqrt());
     let turn = |v: u32, of: f64| std::f64::consts::TAU * f64::from(v) / of;
-    let round = |v: u32, height: f64| [2.0 + 2.0 * turn(v, count.into()).cos(), 2.0 + 2.0 * turn(v, count.into()).sin(), height];
+    let round = |v: u32, height: f64| {
+        [2.0 + 2.0 * turn(v, count.into()).cos(), 2.0 + 2.0 * turn(v, count.into()).sin(), height]
+    };
     let common = thrown(random);
     let line = [thrown(random), thrown(random)];
     let mut all = Vec::new();

@@ -118,15 +118,15 @@ fn scans_in_world_coordinates_keep_their_shape() {
             assert_eq!(back.triangles.len(), 242);
             let world: Vec<_> = back.positions.iter().map(|&p| back.georeference.world(p)).collect();
             // The backends number vertices in their own way; each is the one that is nearest.
-            let apart = |a: [f64; 3], b: [f64; 3]| {
-                (0..3).map(|axis| (a[axis] - b[axis]).powi(2)).sum::<f64>().sqrt()
-            };
+            let apart =
+                |a: [f64; 3], b: [f64; 3]| (0..3).map(|axis| (a[axis] - b[axis]).powi(2)).sum::<f64>().sqrt();
             let nearest: Vec<_> = world
                 .iter()
                 .map(|&w| *given.iter().min_by(|a, b| apart(**a, w).total_cmp(&apart(**b, w))).unwrap())
                 .collect();
             for i in 1..world.len() {
-                let difference = |from: &[[f64; 3]]| std::array::from_fn(|axis| from[i][axis] - from[0][axis]);
+                let difference =
+                    |from: &[[f64; 3]]| std::array::from_fn(|axis| from[i][axis] - from[0][axis]);
                 let off = apart(difference(&world), difference(&nearest));
                 assert!(off < spacing / 10.0, "{name}, {}: vertex {i} is {off} off", backend.name());
             }
