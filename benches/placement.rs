@@ -16,6 +16,7 @@ use foldfront::deviation::Reference;
 use foldfront::path::{Path, Pose, around};
 use foldfront::refine::Strategy;
 use foldfront::store::{self, Backend, BuildOptions, Store};
+use foldfront::vertex_tree::Georeference;
 use foldfront::{CollapseLog, Mesh, mesh_io, simplify};
 use glam::DVec3;
 
@@ -91,7 +92,9 @@ fn compare(
 ) {
     let folder = tempfile::tempdir().expect("a folder for temporary files");
     let mesh = read(file);
-    let path = in_world(around(&mesh), mesh.georeference.origin.into());
+    // About the mesh's own origin first.
+    let local = Mesh { georeference: Georeference::default(), ..mesh.clone() };
+    let path = placed(&around(&local), &Place { shift: mesh.georeference.origin.into(), ..Place::HOME });
     let log = log_of(mesh);
     let home = all_backends(&log, &path, folder.path());
     println!("| {name} | backend | collapses | triangles | 99 % | largest | |");
@@ -153,10 +156,6 @@ fn all_backends(log: &CollapseLog, path: &Path, folder: &FilePath) -> Vec<Figure
         }
     };
     Backend::ALL.into_iter().map(measure).collect()
-}
-
-fn in_world(path: Path, origin: DVec3) -> Path {
-    placed(&path, &Place { shift: origin, ..Place::HOME })
 }
 
 /// The path as it goes by a mesh elsewhere.
