@@ -33,6 +33,8 @@ const THREADS: usize = 2;
 const PATIENCE: Duration = Duration::from_secs(120);
 /// Without an argument.
 const FEW: u64 = 1000;
+/// So many soups after each other go by without a word.
+const QUIET: u64 = 10_000;
 
 /// What was found so far.
 #[derive(Default)]
@@ -79,6 +81,10 @@ fn work(thread: usize, found: &Mutex<Found>, next: &AtomicU64, end: u64, folder:
         let mut found = found.lock().expect("nobody panics with it");
         found.at_work[thread] = None;
         found.done += 1;
+        if found.done.is_multiple_of(QUIET) {
+            let faults = found.endless.len() + found.wrong.len() + found.panicked.len();
+            eprintln!("{} soups, {faults} faults", found.done);
+        }
         match outcome {
             Ok(Ok(())) => {}
             Ok(Err(fault @ Fault::Endless { .. })) => found.endless.push((seed, fault.to_string())),
