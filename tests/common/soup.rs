@@ -1,0 +1,222 @@
+//! Soups: small meshes with whatever can be wrong with one, the same for the same seed.
+//!
+//! A soup has a kind, which says what its triangles join, and 4 to 40 vertices. Each kind comes in its own shape and crumpled,
+//! on a small integer grid or not, at any scale and far from the origin, with windings turned, triangles doubled and doubled
+//! turned over.
+
+use foldfront::Mesh;
+
+/// What the triangles of a soup join.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Kind {
+    /// Three vertices at random.
+    Random,
+    /// A sheet of squares.
+    Grid,
+    /// Around one vertex, closed or not.
+    Fan,
+    /// Pages at one edge.
+    Book,
+    /// A grid joined at its ends both ways: a pinched one where it is small.
+    Torus,
+    /// Each with two corners of the one before.
+    Strip,
+    /// Strips that come back to where they began, and meet themselves there.
+    Loop,
+    /// Few triangles, many times.
+    Repeated,
+    /// Random, most vertices at one place.
+    Coincident,
+    /// Closed: tetrahedra and bipyramids.
+    Closed,
+    /// Two fans that touch at a vertex or at an edge.
+    Touching,
+    /// A grid on a line, or with the corners of each triangle on one.
+    Flat,
+}
+
+impl Kind {
+    pub const ALL: [Self; 12] = [
+        Self::Random,
+        Self::Grid,
+        Self::Fan,
+        Self::Book,
+        Self::Torus,
+        Self::Strip,
+        Self::Loop,
+        Self::Repeated,
+        Self::Coincident,
+        Self::Closed,
+        Self::Touching,
+        Self::Flat,
+    ];
+}
+
+/// A small mesh, and how it came about.
+#[derive(Clone, Debug)]
+pub struct Soup {
+    pub kind: Kind,
+    pub mesh: Mesh,
+}
+
+/// Lengths that an edge is about as long as.
+const SCALES: [f64; 9] = [1e-30, 1e-20, 1e-10, 1e-3, 1.0, 1.0, 1e10, 1e20, 1e30];
+/// How far from the origin, in extents.
+const OFFSETS: [f64; 5] = [0.0, 0.0, 0.0, 1e3, 1e5];
+/// Odds that a triangle is turned.
+const TURNED: [f64; 4] = [0.0, 0.125, 0.25, 0.5];
+/// About the side of the box that vertices lie in, before the scale.
+const SIDE: f64 = 4.0;
+
+/// The soup of a seed.
+pub fn soup(seed: u64) -> Soup {
+    let random = &mut Random(seed.wrapping_mul(0xd134_2543_de82_ef95));
+    let kind = Kind::ALL[random.below(12) as usize];
+    let count = 4 + random.below(37) as u32;
+    let mut triangles = triangles(kind, count, random);
+    let positions = positions(kind, count, random);
+
+    let turned = *random.pick(&TURNED);
+    for t in &mut triangles {
+        if random.unit() < turned {
+            t.swap(1, 2);
+        }
+    }
+    let doubled = *random.pick(&[0.0, 0.0, 0.1, 0.5]);
+    for i in 0..triangles.len() {
+        let [a, b, c] = triangles[i];
+        if random.unit() < doubled {
+            triangles.push(*random.pick(&[[a, b, c], [b, c, a], [b, a, c]]));
+        }
+    }
+    Soup { kind, mesh: Mesh { positions, triangles, ..Mesh::default() } }
+}
+
+fn triangles(kind: Kind, count: u32, random: &mut Random) -> Vec<[u32; 3]> {
+    let any = |random: &mut Random| [(); 3].map(|()| random.below(count.into()) as u32);
+    let side = count.isqrt();
+    match kind {
+        Kind::Random | Kind::Coincident => (0..2 * count).map(|_| any(random)).collect(),
+        Kind::Grid | Kind::Flat => squares(side, side - 1, |x, y| y * side + x),
+        Kind::Torus => squares(side, side, |x, y| y % side * side + x % side),
+        Kind::Fan => fan(0, 1..count, random.below(2) == 0),
+        Kind::Book => (2..count).map(|page| [0, 1, page]).collect(),
+        Kind::Strip => (2..count).map(|v| [v - 2, v - 1, v]).collect(),
+        Kind::Loop => {
+            (0..count).map(|v| [v, v + 1, v + 2 + random.below(3) as u32].map(|v| v % count)).collect()
+        }
+        Kind::Repeated => {
+            let few: Vec<_> = (0..1 + count / 8).map(|_| any(random)).collect();
+            (0..count).map(|_| *random.pick(&few)).collect()
+        }
+        Kind::Closed => {
+            let (mut all, mut next) = (Vec::new(), 0);
+            while next + 4 <= count {
+                let ring = (2 + random.below(5) as u32).min(count - next - 2);
+                let rim = next + 2..next + 2 + ring;
+                // Of a ring of two, both triangles show both sides of one.
+                all.extend(fan(next, rim.clone(), true));
+                all.extend(fan(next + 1, rim, true).into_iter().map(|[a, b, c]| [a, c, b]));
+                next += 2 + ring;
+            }
+            all
+        }
+        Kind::Touching => {
+            let middle = count / 2;
+            let shared = 1 + random.below(2) as u32;
+            let mut all = fan(0, 1..middle + 1, false);
+            all.extend(fan(count - 1, middle + 1 - shared..count - 1, random.below(2) == 0));
+            all
+        }
+    }
+}
+
+/// Two triangles for each square of a grid with `side` vertices a row, `squares` squares either way.
+fn squares(side: u32, squares: u32, vertex: impl Fn(u32, u32) -> u32) -> Vec<[u32; 3]> {
+    let cells = (0..squares * squares).map(|i| (i % squares, i / squares));
+    debug_assert!(squares <= side);
+    cells
+        .flat_map(|(x, y)| {
+            let [a, b] = [vertex(x, y), vertex(x + 1, y)];
+            let [c, d] = [vertex(x, y + 1), vertex(x + 1, y + 1)];
+            [[a, b, d], [a, d, c]]
+        })
+        .collect()
+}
+
+fn fan(hub: u32, rim: std::ops::Range<u32>, closed: bool) -> Vec<[u32; 3]> {
+    let mut all: Vec<_> = rim.clone().zip(rim.clone().skip(1)).map(|(a, b)| [hub, a, b]).collect();
+    if closed && rim.len() > 1 {
+        all.push([hub, rim.end - 1, rim.start]);
+    }
+    all
+}
+
+fn positions(kind: Kind, count: u32, random: &mut Random) -> Vec<[f32; 3]> {
+    let (scale, offset) = (*random.pick(&SCALES), SIDE * *random.pick(&OFFSETS));
+    let (crumpled, whole, plane) = (random.below(2) == 0, random.below(2) == 0, random.below(3) == 0);
+    let thrown = |random: &mut Random| [(); 3].map(|()| random.unit() * SIDE);
+    let side = f64::from(count.isqrt());
+    let turn = |v: u32, of: f64| std::f64::consts::TAU * f64::from(v) / of;
+    let round = |v: u32, height: f64| {
+        [2.0 + 2.0 * turn(v, count.into()).cos(), 2.0 + 2.0 * turn(v, count.into()).sin(), height]
+    };
+    let common = thrown(random);
+    let line = [thrown(random), thrown(random)];
+    let mut all = Vec::new();
+    for v in 0..count {
+        let (x, y) = (f64::from(v % count.isqrt()), f64::from(v / count.isqrt()));
+        let anywhere = thrown(random);
+        let mut p = match kind {
+            Kind::Coincident if random.below(4) > 0 => common,
+            Kind::Flat => {
+                let at = if crumpled { random.unit() } else { f64::from(v) / f64::from(count) };
+                std::array::from_fn(|axis| line[0][axis] + at * (line[1][axis] - line[0][axis]))
+            }
+            _ if crumpled => anywhere,
+            Kind::Grid => [x, y, (0.9 * x).sin() * (0.7 * y).cos()].map(|c| c * SIDE / side),
+            Kind::Torus => {
+                let (around, tube) = (turn(v % count.isqrt(), side), turn(v / count.isqrt(), side));
+                let radius = 1.3 + 0.6 * tube.cos();
+                [2.0 + radius * around.cos(), 2.0 + radius * around.sin(), 0.6 * tube.sin()]
+            }
+            Kind::Fan | Kind::Touching | Kind::Loop => round(v, if v == 0 { 1.0 } else { 0.0 }),
+            Kind::Strip => [0.2 * f64::from(v), f64::from(v % 2), 0.0],
+            Kind::Book if v < 2 => [0.0, 0.0, SIDE * f64::from(v)],
+            _ => anywhere,
+        };
+        if plane {
+            p[2] = 0.0;
+        }
+        if whole {
+            p = p.map(f64::floor);
+        }
+        all.push(p.map(|c| ((c + offset) * scale) as f32));
+    }
+    all
+}
+
+/// SplitMix64 (Steele, Lea & Flood 2014).
+struct Random(u64);
+
+impl Random {
+    fn next(&mut self) -> u64 {
+        self.0 = self.0.wrapping_add(0x9e37_79b9_7f4a_7c15);
+        let z = (self.0 ^ (self.0 >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
+        let z = (z ^ (z >> 27)).wrapping_mul(0x94d0_49bb_1331_11eb);
+        z ^ (z >> 31)
+    }
+
+    fn below(&mut self, limit: u64) -> u64 {
+        self.next() % limit
+    }
+
+    /// In 0..1.
+    fn unit(&mut self) -> f64 {
+        (self.next() >> 11) as f64 / (1_u64 << 53) as f64
+    }
+
+    fn pick<'a, T>(&mut self, from: &'a [T]) -> &'a T {
+        &from[self.below(from.len() as u64) as usize]
+    }
+}
