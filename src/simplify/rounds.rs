@@ -35,6 +35,9 @@ use super::surface::{Spoke, Surface};
 /// 25 %, with 4 150 % and 26 %.
 const MEASURED_WEIGHT: f64 = 2.0;
 
+/// In stars of no more triangles than this, to compare all with all is the fastest.
+const FEW: usize = 16;
+
 /// Triangles that stand in at most where nothing takes the place of a star, and how many on either side of the star's own
 /// place in the order of a hub's triangles.
 const MOST_OTHERS: usize = 256;
@@ -311,6 +314,15 @@ impl Builder {
     /// Finds the corners of triangles of `self.star` that vanish at the merge into `u` which are in none that remains.
     fn find_bereaved(&mut self, u: u32) {
         self.bereaved.clear();
+        if self.star.len() <= FEW {
+            for s in self.star.iter().filter(|s| s.touches(u)) {
+                let apex = if s.next == u { s.last } else { s.next };
+                if !self.star.iter().any(|s| s.touches(apex) && !s.touches(u)) {
+                    self.bereaved.push(apex);
+                }
+            }
+            return;
+        }
         self.marks.clear();
         for w in self.star.iter().filter(|s| !s.touches(u)).flat_map(|s| [s.next, s.last]) {
             self.marks.set(w, 0);
@@ -359,7 +371,6 @@ impl Builder {
                 surface.lose(spoke.next);
                 surface.lose(spoke.last);
             } else {
-                surface.degree[u as usize] += 1;
                 triangle.creator = node;
                 triangle.corners = [u, spoke.next, spoke.last];
             }

@@ -56,6 +56,8 @@ pub(super) struct Samples {
     /// The removed vertex, and the length that is taken for one: a power of two.
     center: Vec3,
     length: f32,
+    /// The reciprocal of that.
+    per_length: f32,
     /// What is there before and after the collapse.
     old: Faces,
     new: Faces,
@@ -75,6 +77,7 @@ impl Samples {
             ids: None,
             center: Vec3::ZERO,
             length: 1.0,
+            per_length: 1.0,
             old: Faces::default(),
             new: Faces::default(),
             triangles: Vec::new(),
@@ -92,6 +95,7 @@ impl Samples {
         // Only the exponent; its reciprocal must be a single-precision number too.
         let exponent = (reach.to_bits() >> 23).clamp(8, 246);
         self.length = f32::from_bits(exponent << 23);
+        self.per_length = 1.0 / self.length;
         self.old.clear();
         self.new.clear();
         self.triangles.clear();
@@ -102,7 +106,7 @@ impl Samples {
 
     /// A point of object space about the removed vertex, in units of its star.
     fn local(&self, p: Vec3) -> Vec3 {
-        (p - self.center) * (1.0 / self.length)
+        (p - self.center) * self.per_length
     }
 
     /// Adds a triangle that the collapse changes.

@@ -76,8 +76,6 @@ pub(super) struct Surface {
     pub virtual_edges: VirtualEdges,
     /// For each triangle, its number in the whole construction, where only some are here, in any order.
     pub triangle_ids: Option<Vec<u32>>,
-    /// For each vertex, the triangles around it.
-    pub degree: Vec<u32>,
     /// Whether the vertex has gained triangles in this round, which its star does not name yet.
     pub gained: Vec<bool>,
     /// Of hubs, how many of the triangles that their stars name have vanished.
@@ -107,7 +105,6 @@ impl Surface {
             live_triangles: triangles.len(),
             virtual_edges: VirtualEdges::default(),
             triangle_ids: None,
-            degree: vec![0; count],
             gained: vec![false; count],
             lost: FxHashMap::default(),
             star_start: vec![0; count],
@@ -140,7 +137,6 @@ impl Surface {
             live_triangles,
             virtual_edges: VirtualEdges::default(),
             triangle_ids: Some(ids),
-            degree: vec![0; vertices],
             gained: vec![false; vertices],
             lost: FxHashMap::default(),
             star_start: vec![0; vertices],
@@ -161,6 +157,7 @@ impl Surface {
         self.live.retain(|&v| self.merged_into[v as usize] == NONE);
         for &v in &self.live {
             self.star_length[v as usize] = 0;
+            self.gained[v as usize] = false;
         }
         for v in self.triangles.iter().flat_map(|t| t.corners) {
             self.star_length[v as usize] += 1;
@@ -185,10 +182,6 @@ impl Surface {
                 let star = &mut self.incident[start..start + self.star_length[v as usize] as usize];
                 star.sort_unstable_by_key(|&t| ids[t as usize]);
             }
-        }
-        for &v in &self.live {
-            self.degree[v as usize] = self.star_length[v as usize];
-            self.gained[v as usize] = false;
         }
         self.lost.clear();
         self.virtual_edges.follow(&self.merged_into);
@@ -253,9 +246,10 @@ impl Surface {
         self.spokes(from).filter(move |s| s.touches(to))
     }
 
-    /// Whether `v` has so many triangles that no work may be done for each of them whenever one vanishes.
+    /// Whether `v` has so many triangles, without those gained in this round, that no work may be done for each of them
+    /// whenever one vanishes.
     pub fn is_hub(&self, v: u32) -> bool {
-        self.degree[v as usize] >= HUB
+        self.star_length[v as usize] >= HUB && self.spokes(v).take(HUB as usize).count() == HUB as usize
     }
 
     /// Triangles that the star of `v` names, whether they are still there or not: how long it takes to go through it.
@@ -266,7 +260,6 @@ impl Surface {
     /// Notes that a triangle around `v` has vanished. What hubs have lost is left out of their stars before it gets long, so
     /// that to pass over it costs no more than the square root of their number.
     pub fn lose(&mut self, v: u32) {
-        self.degree[v as usize] = self.degree[v as usize].saturating_sub(1);
         let length = self.star_length[v as usize];
         if length >= HUB {
             let lost = self.lost.entry(v).or_insert(0);
