@@ -4,7 +4,7 @@
 //!
 //! * A round (`rounds`) takes up each candidate once. A round that collapses leaves a vertex less, so there are fewer such
 //!   rounds than vertices.
-//! * Between two collapses there are at most [`MOST_IDLE`](stall::MOST_IDLE) rounds, and then as many as there are candidates:
+//! * Between two collapses there are at most 64 (`stall::MOST_IDLE`) rounds, and then as many as there are candidates:
 //!   after a round that changed no node, key or state, and after `MOST_IDLE` rounds without a collapse whatever they have
 //!   changed, each round gives up the candidates that come up in vain. At least one does, as the limit of a round is the key
 //!   of a candidate; and one that has been given up comes up no more before there is another collapse.
