@@ -1,6 +1,6 @@
 //! The experiments of XFastMesh (DeCoro & Pajarola 2002) on detail blocks: sizes (their Table 1), construction (Table 2),
 //! frames (Table 3), the tolerance steered to a frame time (Figure 10); and what they did not report: blocks that are
-//! loaded again soon after their removal, what forcing costs against nesting, what the normal-cone test spares, and what
+//! loaded again soon after their removal, what a mapped block index gives over one that is read, what forcing costs against nesting, what the normal-cone test spares, and what
 //! quantisation costs in pixels.
 //!
 //! `cargo bench --bench detail_block` runs all on bunny, horse, dragon and happy; with names after `--`, on those alone:
@@ -63,6 +63,7 @@ struct Built {
     file: Arc<XfmFile>,
     seconds: f64,
     log: CollapseLog,
+    path: PathBuf,
     /// The temporary file is there as long as this is.
     _folder: tempfile::TempDir,
 }
@@ -76,7 +77,7 @@ fn built(log: &CollapseLog, options: &BuildOptions) -> Built {
     let seconds = start.elapsed().as_secs_f64();
     let source = FileSource::open(&path).expect("it was just written");
     let file = Arc::new(XfmFile::open(Arc::new(source)).expect("it was just written"));
-    Built { file, seconds, log: arrangement.effective_log(), _folder: folder }
+    Built { file, seconds, log: arrangement.effective_log(), path, _folder: folder }
 }
 
 fn engine<M: MeshSink>(
@@ -147,6 +148,50 @@ fn frames(name: &str, file: &Arc<XfmFile>, path: &Path, strategy: Strategy) {
         loads as f64 / n as f64,
         counts.peak_bytes / 1024,
         100.0 * again as f64 / counts.removals.max(1) as f64,
+    );
+}
+
+/// The block index read into memory against the paper's, mapped (section 3.3): medians of several runs in turns.
+fn index(name: &str, path: &std::path::Path, walk: &Path) {
+    const RUNS: usize = 7;
+    let mut rows = [[const { Vec::new() }; 3], [const { Vec::new() }; 3]];
+    for run in 0..2 * RUNS {
+        let is_mapped = run % 2 == 1;
+        let start = Instant::now();
+        let file = if is_mapped {
+            #[expect(unsafe_code, reason = "mapping is what is measured")]
+            // SAFETY: the file is in a temporary folder of this process, which does not touch it any more.
+            let file = unsafe { XfmFile::open_mapped(path) };
+            file
+        } else {
+            let source = FileSource::open(path).expect("it was just written");
+            XfmFile::open(Arc::new(source))
+        };
+        let file = Arc::new(file.expect("it was just written"));
+        let opened = start.elapsed();
+        let mut engine = engine(&file, NullSink, walk, Strategy::Event, SOFT);
+        let mut times = Vec::new();
+        for frame in 0..walk.frames.len() {
+            let start = Instant::now();
+            engine.advance(&[view(walk, frame)]).expect("the store is there");
+            times.push(start.elapsed());
+        }
+        times.sort_unstable();
+        let row = &mut rows[usize::from(is_mapped)];
+        for (column, time) in
+            row.iter_mut().zip([opened, times[times.len() / 2], times[times.len() * 99 / 100]])
+        {
+            column.push(time);
+        }
+    }
+    let median = |column: &mut Vec<Duration>| {
+        column.sort_unstable();
+        column[column.len() / 2].as_secs_f64() * 1e3
+    };
+    let [read, mapped] = rows.each_mut().map(|row| row.each_mut().map(median));
+    println!(
+        "| {name}, {} | {:.3} | {:.3} | {:.3} | {:.3} | {:.3} | {:.3} |",
+        walk.name, read[0], read[1], read[2], mapped[0], mapped[1], mapped[2]
     );
 }
 
@@ -299,6 +344,11 @@ fn main() {
             for strategy in [Strategy::TopDown, Strategy::Event] {
                 frames(&name, &plain.file, path, strategy);
             }
+        }
+        println!("\n| block index, ms | read: open | median | 99 % | mapped: open | median | 99 % |");
+        println!("| --- | --- | --- | --- | --- | --- | --- |");
+        for path in &paths {
+            index(&name, &plain.path, path);
         }
         println!("\n| needs | nested: nodes | triangles | forced | not nested: nodes | triangles | forced |");
         println!("| --- | --- | --- | --- | --- | --- | --- |");

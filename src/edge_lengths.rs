@@ -3,9 +3,13 @@
 
 use std::array;
 
-/// Bits of a 32-bit length that do not tell its class: 7 of the mantissa are left, so that the middle of a class is within
-/// 2^-8 of all lengths in it.
-const CLASS_SHIFT: u32 = 16;
+/// Bits of a squared length that do not tell its class: 6 of the mantissa are left, so that the middle of a class is within
+/// 2^-7 of all squares in it, and its root within 2^-8 of all lengths.
+const CLASS_SHIFT: u32 = 46;
+
+/// Squares of lengths that are less than any difference of single-precision numbers, or more than all of them, need no classes.
+const LEAST: f64 = 1e-92;
+const MOST: f64 = 1e78;
 
 /// A histogram of the lengths of edges, for their median.
 #[derive(Debug, Default)]
@@ -19,13 +23,13 @@ impl EdgeLengths {
     /// Adds the three edges of a triangle. Those without a length do not count.
     pub fn add(&mut self, corners: [[f64; 3]; 3]) {
         if self.classes.is_empty() {
-            self.classes = vec![0; (f32::INFINITY.to_bits() >> CLASS_SHIFT) as usize + 1];
+            self.classes = vec![0; class(MOST) + 1];
         }
         for (from, to) in [(0, 1), (1, 2), (2, 0)] {
-            let squares: [f64; 3] = array::from_fn(|axis| (corners[to][axis] - corners[from][axis]).powi(2));
-            let length = squares.iter().sum::<f64>().sqrt().min(f64::from(f32::MAX)) as f32;
-            if length > 0.0 {
-                self.classes[(length.to_bits() >> CLASS_SHIFT) as usize] += 1;
+            let [x, y, z]: [f64; 3] = array::from_fn(|axis| corners[to][axis] - corners[from][axis]);
+            let squared = x * x + y * y + z * z;
+            if squared >= LEAST {
+                self.classes[class(squared.min(MOST))] += 1;
                 self.all += 1;
             }
         }
@@ -40,9 +44,17 @@ impl EdgeLengths {
         });
         match median {
             None => 0.0,
-            Some(class) => f64::from(f32::from_bits((class as u32) << CLASS_SHIFT | 1 << (CLASS_SHIFT - 1))),
+            Some(class) => {
+                let least = class as u64 + (LEAST.to_bits() >> CLASS_SHIFT);
+                f64::from_bits(least << CLASS_SHIFT | 1 << (CLASS_SHIFT - 1)).sqrt()
+            }
         }
     }
+}
+
+/// The class of a square between the least and the most.
+fn class(squared: f64) -> usize {
+    (squared.to_bits() >> CLASS_SHIFT) as usize - (LEAST.to_bits() >> CLASS_SHIFT) as usize
 }
 
 /// The power of two at or below a length, and 1 for 0: between 2^-100 and 2^100, so that its reciprocal is a single-precision

@@ -22,10 +22,12 @@ mod ball;
 mod candidates;
 mod faces;
 mod key_counts;
+mod lanes;
 mod legality;
 mod marks;
 mod nodes;
 mod order;
+mod orientation;
 mod out_of_core;
 mod quadric;
 mod remains;
@@ -160,14 +162,14 @@ pub fn build(mesh: Mesh, options: &Options, progress: Progress) -> Result<(Colla
     let positions: Vec<Vec3> = order.iter().map(|&old| given[old as usize]).collect();
     drop(given);
     let leaf_radius = leaf_radii(mesh, &number);
-    let mut surface = Surface::new(positions, &coherent_triangles(&mesh.triangles, &number));
+    let mut surface = Surface::new(positions, &coherent_triangles(&mesh.triangles, &number), unit);
     let mut marks = Marks::new(order.len());
     let mut neighbours = Vec::new();
     for i in 0..surface.live.len() {
-        set_initial_quadric(surface.live[i], unit, &mut surface, &mut marks, &mut neighbours);
+        set_initial_quadric(surface.live[i], &mut surface, &mut marks, &mut neighbours);
     }
     let nodes = Nodes::new(leaf_radius, extent, unit);
-    let mut builder = Builder::new(surface, nodes, marks, options.merge_components, unit);
+    let mut builder = Builder::new(surface, nodes, marks, options.merge_components);
     builder.begin();
     let preparation = start.elapsed();
 
@@ -298,13 +300,8 @@ fn coherent_triangles(triangles: &[[u32; 3]], number: &[u32]) -> Vec<[u32; 3]> {
 
 /// Gives `v` the planes of the triangles around it, weighted by area, and at edges that do not join exactly two triangles
 /// a plane through the edge, upright on the triangle. Also finds whether the vertex has such edges.
-fn set_initial_quadric(
-    v: u32,
-    unit: f64,
-    surface: &mut Surface,
-    marks: &mut Marks,
-    neighbours: &mut Vec<Neighbour>,
-) {
+fn set_initial_quadric(v: u32, surface: &mut Surface, marks: &mut Marks, neighbours: &mut Vec<Neighbour>) {
+    let unit = surface.unit;
     let mut quadric = Quadric::default();
     // In double precision no product of four lengths vanishes or overflows.
     let area = 0.5 / (unit * unit);

@@ -267,7 +267,7 @@ impl Store {
             None => Err(StoreError::Foreign { file: file.to_owned() }),
             Some(Backend::InMemory) => Self::in_memory(Arc::new(read_log(file)?)),
             Some(Backend::MetaNode) => Ok(Self::MetaNode(Arc::new(MetaNodeFile::open(source)?))),
-            Some(Backend::DetailBlock) => Ok(Self::DetailBlock(Arc::new(XfmFile::open_path(file)?))),
+            Some(Backend::DetailBlock) => Ok(Self::DetailBlock(Arc::new(XfmFile::open(source)?))),
             Some(Backend::MtPartition) => Ok(Self::MtPartition(Arc::new(MtFile::open(source)?))),
         }
     }

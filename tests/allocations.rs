@@ -21,7 +21,7 @@ thread_local! {
 struct Counting;
 
 // SAFETY: every call is handed on unchanged to the system's allocator.
-#[allow(unsafe_code, reason = "an allocator can not be had without")]
+#[expect(unsafe_code, reason = "an allocator can not be had without")]
 unsafe impl GlobalAlloc for Counting {
     unsafe fn alloc(&self, layout: Layout) -> *mut u8 {
         ALLOCATIONS.set(ALLOCATIONS.get() + 1);

@@ -276,3 +276,31 @@ impl Random {
         view.k = (view.k + course.kappa * (self.unit() - 0.5) * 2.0).max(1.0);
     }
 }
+
+/// Deadlines would leave 64 bits: a clock that has come to its end lets everything come up at every advance.
+#[test]
+fn a_clock_can_go_on_for_ever() {
+    let found_at_rest = |end: f64| {
+        let mut queue = EventQueue::new(1);
+        let mut due = [Event::BLANK; DUE];
+        let mut found = 0;
+        for now in [end / 2.0, end, end] {
+            found = 0;
+            for frames in [0.0, 1.0, 1e5, f64::INFINITY] {
+                let event = queue.event(Slot(3), Kind::Unfold, BOUNDS);
+                queue.schedule(0, frames, event);
+            }
+            queue.advance(0, now);
+            while let count @ 1.. = queue.next_due(&mut due) {
+                found += count;
+            }
+            assert_eq!(found + queue.len(), 4);
+        }
+        found
+    };
+    // Well before the end, what is due now comes up where the clock rests, and nothing else.
+    assert_eq!(found_at_rest(9e15), 1);
+    for end in [9.1e15, 3.6e16, 1e18, 1e300, f64::INFINITY] {
+        assert_eq!(found_at_rest(end), 4, "at {end}");
+    }
+}

@@ -166,7 +166,9 @@ const HEADER: usize = 64;
 impl MappedTree {
     /// `is_random` tells the operating system not to read around what is touched.
     pub fn open(path: &Path, is_random: bool) -> Self {
-        let map = MappedSource::open(path).expect("just written");
+        #[expect(unsafe_code, reason = "virtual memory is what is compared with")]
+        // SAFETY: the file is in a temporary folder of this process, which does not touch it any more.
+        let map = unsafe { MappedSource::open(path) }.expect("just written");
         if is_random {
             map.expect_random_access().expect("advice is taken");
         }

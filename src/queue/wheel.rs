@@ -8,6 +8,9 @@ pub(super) const SLOTS: u64 = 16;
 /// Level 28 reaches 2^32 ticks ahead, which is further than any deadline: those are `u32` ticks ahead, and what is
 /// further is scheduled again.
 pub(super) const LEVELS: usize = 29;
+/// A clock goes no further than this tick: beyond it, deadlines would leave 64 bits. Years of frames at a billion times the
+/// declared speed get there. From then on all events come up at every advance, which is right and slow.
+const LAST_TICK: u64 = 1 << 62;
 
 /// Buckets of events on one clock.
 #[derive(Debug)]
@@ -45,7 +48,7 @@ impl Wheel {
         let straddles = (deadline >> level) - (self.tick >> level) >= SLOTS;
         let level = level + u32::from(straddles);
         let number = deadline >> level;
-        self.next = self.next.min(number << level);
+        self.next = self.next.min((number << level).min(LAST_TICK));
         self.in_use |= 1 << level;
         let slot = number as u32 % SLOTS as u32;
         // Never more than there are, which spares a panic.
@@ -57,10 +60,14 @@ impl Wheel {
     /// Moves each bucket that the clock reaches on its way to `now` to `ripe`.
     pub fn advance(&mut self, now: f64, ripe: &mut Vec<Bucket>) {
         let before = self.tick;
-        let after = (now * TICKS_PER_FRAME) as u64;
+        let after = tick(now);
         debug_assert!(after >= before, "the clock went back from tick {before} to {after}");
         self.tick = after;
         if after < self.next {
+            return;
+        }
+        if after == LAST_TICK {
+            self.take_all(ripe);
             return;
         }
         self.next = u64::MAX;
@@ -77,7 +84,7 @@ impl Wheel {
             if self.occupied[level] != 0 {
                 // What is left lies after the present slot, once round at most.
                 let ahead = self.occupied[level].rotate_right(((last + 1) % SLOTS) as u32).trailing_zeros();
-                self.next = self.next.min((last + 1 + u64::from(ahead)) << level);
+                self.next = self.next.min(((last + 1 + u64::from(ahead)) << level).min(LAST_TICK));
             }
         }
     }
@@ -91,13 +98,15 @@ impl Wheel {
 
     /// The buckets that an advance to `now` would reach.
     pub fn due_within(&self, now: f64) -> impl Iterator<Item = Bucket> + '_ {
-        let last = (now * TICKS_PER_FRAME) as u64;
+        let last = tick(now);
         let levels = bits(if last < self.next { 0 } else { self.in_use });
         levels.flat_map(move |level| {
             // The present slot of a wider level has been drained.
-            let (first, last) = ((self.tick >> level) + u64::from(level > 0), last >> level);
+            let first = (self.tick >> level) + u64::from(level > 0);
+            let round = first + SLOTS - 1;
+            let last = if last == LAST_TICK { round } else { (last >> level).min(round) };
             let slots = &self.levels[level];
-            (first..=last.min(first + SLOTS - 1)).map(move |slot| slots[(slot % SLOTS) as usize])
+            (first..=last).map(move |slot| slots[(slot % SLOTS) as usize])
         })
     }
 
@@ -117,6 +126,11 @@ impl Wheel {
             slots &= slots - 1;
         }
     }
+}
+
+/// The tick in which a time lies, in frames.
+fn tick(now: f64) -> u64 {
+    ((now * TICKS_PER_FRAME) as u64).min(LAST_TICK)
 }
 
 /// The bits that are set, the lowest first.

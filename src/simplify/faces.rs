@@ -16,6 +16,8 @@ use std::ops::Range;
 
 use glam::{Vec3, Vec4};
 
+use super::lanes::{Lanes, cross, dot, minus, set, splat};
+
 /// Four triangles, a coordinate in each `Vec4`. Lanes that are not in use hold triangles that are a single point, a
 /// corner of the first, and are never nearer than that.
 #[derive(Clone, Copy, Debug, Default)]
@@ -34,9 +36,6 @@ struct Four {
     per_cc: Vec4,
     per_ee: Vec4,
 }
-
-/// Four vectors: all x, all y, all z.
-type Lanes = [Vec4; 3];
 
 /// A sliver whose height is less than this part of its length is measured by its edges alone; squared.
 const SLIVER: f32 = 1e-10;
@@ -62,16 +61,14 @@ impl Faces {
     pub fn push(&mut self, [a, b, c]: [Vec3; 3]) {
         let lane = self.count % 4;
         if lane == 0 {
-            self.fours.push(Four { a: a.to_array().map(Vec4::splat), ..Four::default() });
+            self.fours.push(Four { a: splat(a), ..Four::default() });
         }
         self.count += 1;
         if let Some(four) = self.fours.last_mut() {
             let (b, c) = (b - a, c - a);
-            for axis in 0..3 {
-                four.a[axis][lane] = a[axis];
-                four.b[axis][lane] = b[axis];
-                four.c[axis][lane] = c[axis];
-            }
+            set(&mut four.a, lane, a);
+            set(&mut four.b, lane, b);
+            set(&mut four.c, lane, c);
         }
     }
 
@@ -96,17 +93,19 @@ impl Faces {
     /// is no farther away.
     pub fn nearest(&self, p: Vec3, beside: Option<usize>) -> (u32, f32) {
         let range = self.range(beside);
-        let mut nearest = (4 * range.start as u32, f32::INFINITY);
-        let mut number = nearest.0;
-        for four in &self.fours[range] {
-            for distance_squared in four.distances_squared(p).to_array() {
-                if distance_squared < nearest.1 {
-                    nearest = (number, distance_squared);
+        let (mut nearest, mut least) = (4 * range.start, f32::INFINITY);
+        for (i, four) in range.clone().zip(&self.fours[range]) {
+            let squares = four.distances_squared(p);
+            // Rarely so, after the first.
+            if squares.cmplt(Vec4::splat(least)).any() {
+                for (lane, squared) in (4 * i..).zip(squares.to_array()) {
+                    if squared < least {
+                        (nearest, least) = (lane, squared);
+                    }
                 }
-                number += 1;
             }
         }
-        nearest
+        (nearest as u32, least)
     }
 
     /// Squared distance to the nearest triangle, or any value up to `enough` once one has been found that near. Of many
@@ -143,7 +142,7 @@ impl Four {
     }
 
     fn distances_squared(&self, p: Vec3) -> Vec4 {
-        let p = minus(p.to_array().map(Vec4::splat), self.a);
+        let p = minus(splat(p), self.a);
         let (b, c) = (self.b, self.c);
         let edges = past_edge(p, b, self.per_bb).min(past_edge(p, c, self.per_cc)).min(past_edge(
             minus(p, b),
@@ -162,18 +161,6 @@ fn past_edge(p: Lanes, e: Lanes, per_ee: Vec4) -> Vec4 {
     let t = (dot(p, e) * per_ee).max(Vec4::ZERO).min(Vec4::ONE);
     let d = minus(p, e.map(|x| x * t));
     dot(d, d)
-}
-
-fn minus(a: Lanes, b: Lanes) -> Lanes {
-    [a[0] - b[0], a[1] - b[1], a[2] - b[2]]
-}
-
-fn dot(a: Lanes, b: Lanes) -> Vec4 {
-    a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
-}
-
-fn cross(a: Lanes, b: Lanes) -> Lanes {
-    [a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]]
 }
 
 fn reciprocal(x: Vec4) -> Vec4 {

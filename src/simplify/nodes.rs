@@ -97,9 +97,9 @@ impl Nodes {
         self.ids.as_ref().map_or(node, |ids| ids[node as usize])
     }
 
-    /// Whether `node` is one of the round whose first node has the number `first` in the whole construction.
-    pub fn is_from(&self, node: u32, first: u32) -> bool {
-        node != NONE && self.id(node) >= first
+    /// Whether `node` is one of this round.
+    pub fn is_new(&self, node: u32) -> bool {
+        node != NONE && self.id(node) >= self.first_of_round
     }
 
     /// Makes the node of a collapse, unless its sphere is too large for single precision, and says whether it has.
@@ -143,7 +143,7 @@ impl Nodes {
             self.balls.push(Ball { center: b.center.map(f64::from).into(), radius: f64::from(b.radius) });
             eps = eps.max(b.eps);
             depth = depth.max(self.depth[node as usize]);
-            if self.is_from(node, self.first_of_round) {
+            if self.is_new(node) {
                 key = key.max(self.keys[node as usize]);
                 follows = true;
             }

@@ -57,6 +57,8 @@ pub(super) struct Builder {
     order: Vec<u64>,
     /// The star of the vertex in question.
     star: Vec<Spoke>,
+    /// For each triangle of it, where the other two corners are for [`measure`](Self::measure).
+    ring: Vec<[Vec3; 2]>,
     /// Vertices that lose a triangle and get none of the new ones.
     bereaved: Vec<u32>,
     /// Triangles that stand in where nothing takes the place of the star.
@@ -67,28 +69,26 @@ pub(super) struct Builder {
     pub gives_up: bool,
     /// Whether triangles may turn by nearly a right angle, as there is no other way left.
     pub leans: bool,
-    /// Length of a unit of the simplification in object units.
-    unit: f64,
 }
 
 impl Builder {
-    pub fn new(surface: Surface, nodes: Nodes, marks: Marks, merge: bool, unit: f64) -> Builder {
+    pub fn new(surface: Surface, nodes: Nodes, marks: Marks, merge: bool) -> Builder {
         let (points, count) = (surface.positions.len(), surface.merged_into.len());
         Builder {
             surface,
             nodes,
-            candidates: Candidates::new(count, unit),
+            candidates: Candidates::new(count),
             samples: Samples::new(points),
             marks,
             touched: None,
             order: Vec::new(),
             star: Vec::new(),
+            ring: Vec::new(),
             bereaved: Vec::new(),
             others: Vec::new(),
             merge,
             gives_up: false,
             leans: false,
-            unit,
         }
     }
 
@@ -162,7 +162,7 @@ impl Builder {
 
     /// A round; see [`run`](Self::run). Stars have to be rebuilt afterwards if there are new nodes.
     fn run_round(&mut self, limit: f32, all: usize, numbers: u32, number: impl Fn(u32) -> u32) {
-        let first_id = self.nodes.next_id;
+        self.nodes.first_of_round = self.nodes.next_id;
         let shift = order::span(all, self.surface.live.len()).ilog2();
         let piece = |v: u32| number(v) >> shift;
         let mut pairs: Vec<[u32; 2]> = Vec::new();
@@ -185,7 +185,7 @@ impl Builder {
                 let this = block(start);
                 let end = (start..all_live).find(|&i| block(i) != this).unwrap_or(all_live);
                 if borders[this as usize] == are_on_borders {
-                    self.run_block(limit, first_id, start..end);
+                    self.run_block(limit, start..end);
                 }
                 start = end;
             }
@@ -193,11 +193,9 @@ impl Builder {
         self.candidates.parity = self.candidates.parity.other();
     }
 
-    /// The part of a round in which the vertices `live[range]` come up, which are one block. `first` is the first node of
-    /// the round.
-    pub fn run_block(&mut self, limit: f32, first: u32, range: Range<usize>) {
+    /// The part of a round in which the vertices `live[range]` come up, which are one block.
+    pub fn run_block(&mut self, limit: f32, range: Range<usize>) {
         self.order.clear();
-        self.nodes.first_of_round = first;
         for i in range {
             let v = self.surface.live[i];
             self.candidates.visit(v, &mut self.surface, &mut self.marks);
@@ -211,7 +209,7 @@ impl Builder {
         for i in 0..self.order.len() {
             let v = self.order[i] as u32;
             let made = self.nodes.next();
-            self.attempt(v, first, limit);
+            self.attempt(v, limit);
             if self.gives_up && self.nodes.next() == made {
                 self.candidates.give_up(v);
             }
@@ -249,23 +247,22 @@ impl Builder {
         );
     }
 
-    /// Makes the collapse of `v`'s candidate if nothing near has changed in this round, whose first node is given, and
-    /// it is legal.
-    fn attempt(&mut self, v: u32, first: u32, limit: f32) {
+    /// Makes the collapse of `v`'s candidate if nothing near has changed in this round, and it is legal.
+    fn attempt(&mut self, v: u32, limit: f32) {
         let state = self.candidates.state[v as usize];
         if matches!(state, State::Outdated(_) | State::Updated(_) | State::Nothing) {
             return;
         }
         let u = self.candidates.target[v as usize];
+        if self.nodes.is_new(self.nodes.top[u as usize]) && !self.may_follow(u) {
+            return;
+        }
         self.star.clear();
         self.star.extend(self.surface.spokes(v));
         let joined = self.star.iter().any(|s| s.touches(u));
         if !joined && !self.surface.virtual_edges.partners(v).any(|w| w == u) {
             // The edge has gone with its last triangle.
             self.candidates.forget(v);
-            return;
-        }
-        if self.nodes.is_from(self.nodes.top[u as usize], first) && !self.may_follow(u) {
             return;
         }
         if state == State::Forced {
@@ -279,7 +276,7 @@ impl Builder {
             return;
         }
         self.find_bereaved(u);
-        let changed = |w: &u32| self.nodes.is_from(self.nodes.trace[*w as usize], first);
+        let changed = |w: &u32| self.nodes.is_new(self.nodes.trace[*w as usize]);
         if self.bereaved.iter().any(|w| changed(w) && !self.may_follow(*w)) {
             return;
         }
@@ -289,7 +286,7 @@ impl Builder {
             self.candidates.give_up(v);
             return;
         }
-        let of_unit = error / self.unit;
+        let of_unit = error / self.surface.unit;
         let key = (MEASURED_WEIGHT * of_unit * of_unit).min(f64::from(f32::MAX)) as f32;
         let key = key.max(self.candidates.key[v as usize]);
         self.candidates.changed |= key != self.candidates.key[v as usize];
@@ -301,7 +298,7 @@ impl Builder {
             }
             return;
         }
-        self.collapse(v, u, error);
+        self.collapse(v, u, joined, error);
     }
 
     /// Whether another collapse may change the star of `v` in a round in which one has: where `v` is a hub that has only lost
@@ -335,8 +332,9 @@ impl Builder {
         }
     }
 
-    /// Merges `v`, whose star is in `self.star`, into `u`, which has just been measured.
-    fn collapse(&mut self, v: u32, u: u32, error: f64) {
+    /// Merges `v`, whose star is in `self.star`, into `u`, which has just been measured. `joined` says whether triangles join
+    /// the two.
+    fn collapse(&mut self, v: u32, u: u32, joined: bool, error: f64) {
         let surface = &mut self.surface;
         let (from, to) = (surface.position(v), surface.position(u));
         let node = self.nodes.next();
@@ -350,7 +348,6 @@ impl Builder {
         }
 
         surface.gained[u as usize] |= self.star.iter().any(|s| !s.touches(u));
-        let joined = self.star.iter().any(|s| s.touches(u));
         // Where all is regular, a legal collapse keeps it so.
         let regular =
             joined && !surface.special[v as usize] && self.candidates.state[v as usize] != State::Forced;
@@ -388,7 +385,7 @@ impl Builder {
         surface.merged_into[v as usize] = u;
         self.samples.finish(|t, list| surface.triangles[t as usize].samples = list);
         let carried = surface.quadrics[v as usize];
-        surface.quadrics[u as usize].absorb(&carried, (to - from) * (1.0 / self.unit) as f32);
+        surface.quadrics[u as usize].absorb(&carried, (to - from) * surface.per_unit);
     }
 
     /// Measures how far what is shown moves from the input when `v`, whose star is in `self.star`, merges into `u`: in object
@@ -400,16 +397,22 @@ impl Builder {
             samples.begin(surface.position(v), 0.0);
             return 0.0;
         }
-        let corners = self.star.iter().flat_map(|s| [s.next, s.last]).chain([u]);
-        let reach =
-            corners.fold(Vec3::ZERO, |reach, w| reach.max((surface.position(w) - surface.position(v)).abs()));
-        samples.begin(surface.position(v), reach.max_element());
         let (from, to) = (surface.position(v), surface.position(u));
-        let with = |a, s: &Spoke| [a, surface.position(s.next), surface.position(s.last)];
+        self.ring.clear();
+        let mut reach = (to - from).abs();
         for s in &self.star {
-            samples.add_old(with(from, s));
+            let [next, last] = [s.next, s.last].map(|w| surface.position(w) - from);
+            reach = reach.max(next.abs()).max(last.abs());
+            self.ring.push([next, last]);
+        }
+        samples.begin(from, reach.max_element());
+        let u_there = samples.local(to);
+        for (s, ring) in self.star.iter().zip(&mut self.ring) {
+            let [next, last] = ring.map(|way| samples.shortened(way));
+            *ring = [next, last];
+            samples.add_old([Vec3::ZERO, next, last]);
             if !s.touches(u) {
-                samples.add_new(s.triangle, with(to, s));
+                samples.add_new(s.triangle, [u_there, next, last]);
             }
         }
         // Where nothing takes the place of the star, what remains nearby has to stand in.
@@ -421,7 +424,8 @@ impl Builder {
                     if self.others.len() < MOST_OTHERS && !s.touches(v) && !self.others.contains(&s.triangle)
                     {
                         self.others.push(s.triangle);
-                        samples.add_new(s.triangle, with(surface.position(w), &s));
+                        let corners = [w, s.next, s.last].map(|x| samples.local(surface.position(x)));
+                        samples.add_new(s.triangle, corners);
                     }
                 };
                 match self.star.first() {
@@ -455,13 +459,14 @@ impl Builder {
             remaining += usize::from(!s.touches(u));
         }
         self.others.iter().for_each(|&t| place_list(t, 0));
-        for (i, s) in self.star.iter().enumerate().filter(|(_, s)| !s.touches(u)) {
+        for (i, (_, &[next, last])) in
+            self.star.iter().zip(&self.ring).enumerate().filter(|(_, (s, _))| !s.touches(u))
+        {
             // The triangle's other edge from `u` is the next one's, or was there before.
-            let [_, next, last] = with(to, s);
-            samples.measure_reverse(&[to, next], i);
+            samples.measure_reverse(&[u_there, next], i);
             if self.merge {
                 // Joined walls can close a yard whose rim they do not leave.
-                samples.measure_reverse(&[to, next, last], i);
+                samples.measure_reverse(&[u_there, next, last], i);
             }
         }
         samples.error()

@@ -105,19 +105,24 @@ impl Samples {
     }
 
     /// A point of object space about the removed vertex, in units of its star.
-    fn local(&self, p: Vec3) -> Vec3 {
-        (p - self.center) * self.per_length
+    pub fn local(&self, p: Vec3) -> Vec3 {
+        self.shortened(p - self.center)
     }
 
-    /// Adds a triangle that the collapse changes.
+    /// A vector of object space, in units of the star.
+    pub fn shortened(&self, way: Vec3) -> Vec3 {
+        way * self.per_length
+    }
+
+    /// Adds a triangle that the collapse changes, by its corners about the removed vertex.
     pub fn add_old(&mut self, corners: [Vec3; 3]) {
-        self.old.push(corners.map(|p| self.local(p)));
+        self.old.push(corners);
     }
 
-    /// Adds a triangle that there is after the collapse.
+    /// Adds a triangle that there is after the collapse, by its corners about the removed vertex.
     pub fn add_new(&mut self, triangle: u32, corners: [Vec3; 3]) {
         self.triangles.push(triangle);
-        self.new.push(corners.map(|p| self.local(p)));
+        self.new.push(corners);
     }
 
     /// Whether there is no triangle after the collapse.
@@ -196,10 +201,10 @@ impl Samples {
         self.worst = self.worst.max(distance_squared);
     }
 
-    /// Measures the middle of some corners of the new triangles against the old ones, the first of them those near the one
-    /// with number `beside`.
+    /// Measures the middle of some corners of the new triangles, about the removed vertex, against the old ones, the first of
+    /// them those near the one with number `beside`.
     pub fn measure_reverse(&mut self, corners: &[Vec3], beside: usize) {
-        let sum: Vec3 = corners.iter().map(|&p| self.local(p)).sum();
+        let sum: Vec3 = corners.iter().sum();
         let p = sum * (1.0 / corners.len() as f32);
         self.worst = self.worst.max(self.old.distance_squared(p, self.worst, beside));
     }

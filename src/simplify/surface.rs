@@ -60,6 +60,10 @@ const HUB: u32 = 64;
 pub(super) struct Surface {
     /// In object units.
     pub positions: Vec<Vec3>,
+    /// Length of a unit of the simplification in object units: a power of two, about as long as most edges.
+    pub unit: f64,
+    /// Its reciprocal.
+    pub per_unit: f32,
     pub quadrics: Vec<Quadric>,
     /// Whether the vertex touches an edge that does not join exactly two triangles of the same orientation. Of vertices near
     /// a recent change it may say so falsely.
@@ -87,7 +91,7 @@ pub(super) struct Surface {
 
 impl Surface {
     /// `triangles` must have three different corners each.
-    pub fn new(positions: Vec<Vec3>, triangles: &[[u32; 3]]) -> Surface {
+    pub fn new(positions: Vec<Vec3>, triangles: &[[u32; 3]], unit: f64) -> Surface {
         let count = positions.len();
         let mut has_triangle = vec![false; count];
         for &v in triangles.iter().flatten() {
@@ -96,6 +100,8 @@ impl Surface {
         let triangle = |&corners| Triangle { corners, creator: NONE, samples: NONE };
         let mut surface = Surface {
             positions,
+            unit,
+            per_unit: (1.0 / unit) as f32,
             quadrics: vec![Quadric::default(); count],
             special: vec![false; count],
             joined: vec![false; count],
@@ -125,9 +131,12 @@ impl Surface {
         triangles: Vec<Triangle>,
         ids: Vec<u32>,
         live_triangles: usize,
+        unit: f64,
     ) -> Surface {
         let mut surface = Surface {
             positions,
+            unit,
+            per_unit: (1.0 / unit) as f32,
             quadrics: vec![Quadric::default(); vertices],
             special,
             joined: vec![false; vertices],

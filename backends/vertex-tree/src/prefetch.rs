@@ -12,7 +12,7 @@ pub fn prefetch<T>(elements: &[T], index: usize) {
         use std::arch::x86_64::{_MM_HINT_T0, _mm_prefetch};
         // SAFETY: a prefetch reads nothing that the program can see and never faults, whatever the address; this one is
         // that of an element.
-        #[allow(
+        #[expect(
             unsafe_code,
             reason = "the hint is not to be had without, and worth a third of a status change"
         )]

@@ -182,10 +182,20 @@ pub trait VertexTree {
     fn log_number(&self, node: NodeId) -> u32;
 
     /// Reports the base mesh: what is shown while every node is folded. Called once, before any other change.
+    ///
+    /// # Errors
+    /// If the store fails, or what it holds is damaged.
     fn base_mesh<M: MeshSink>(&mut self, mesh: &mut M) -> Result<(), TreeError>;
     /// Unfolds a boundary node: its vertex splits in two.
+    ///
+    /// # Errors
+    /// If what the change takes was read, and the store failed or is damaged there. Nothing has changed then; a page that is
+    /// only not here yet is no error, see [`Step::NotResident`].
     fn unfold<M: MeshSink>(&mut self, node: NodeId, mesh: &mut M) -> Result<Step, TreeError>;
     /// Folds a collapsible node: the inverse of [`unfold`](Self::unfold).
+    ///
+    /// # Errors
+    /// As for [`unfold`](Self::unfold).
     fn fold<M: MeshSink>(&mut self, node: NodeId, mesh: &mut M) -> Result<Step, TreeError>;
 
     /// Reports what [`unfold`](Self::unfold) and [`fold`](Self::fold) have put off: the mesh can follow all changes of a frame
@@ -232,6 +242,9 @@ pub trait VertexTree {
     }
     /// Starts a frame. Appends to `arrived` the nodes for which a [`Step::NotResident`] was answered and that are to be asked
     /// again. One that is missing here waits for as long as it is wanted, so a backend in doubt names it.
+    ///
+    /// # Errors
+    /// If a page that was asked for could not be read, or is damaged.
     fn begin_frame(&mut self, arrived: &mut Vec<NodeId>) -> Result<(), TreeError> {
         let _ = arrived;
         Ok(())
@@ -243,10 +256,16 @@ pub trait VertexTree {
     }
     /// Waits until every page that has been asked for has arrived or failed: for replays whose cuts shall be comparable,
     /// and for a first frame. Nothing else here may wait.
+    ///
+    /// # Errors
+    /// Those of [`begin_frame`](Self::begin_frame).
     fn settle(&mut self) -> Result<(), TreeError> {
         Ok(())
     }
     /// Ends a frame: the moment for eviction.
+    ///
+    /// # Errors
+    /// Those of [`begin_frame`](Self::begin_frame).
     fn end_frame(&mut self) -> Result<PageStats, TreeError> {
         Ok(PageStats::default())
     }

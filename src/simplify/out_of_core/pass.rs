@@ -148,18 +148,11 @@ impl Pass<'_> {
                         let v = v as u32;
                         let squared = farthest(builder, v);
                         builder.nodes.leaf_radius[v as usize] = leaf_radius(squared);
-                        let unit = self.whole.unit;
-                        set_initial_quadric(
-                            v,
-                            unit,
-                            &mut builder.surface,
-                            &mut builder.marks,
-                            &mut neighbours,
-                        );
+                        set_initial_quadric(v, &mut builder.surface, &mut builder.marks, &mut neighbours);
                         builder.candidates.refresh(v, &mut builder.surface, &mut builder.marks);
                     }
                 }
-                Work::Round(limit) => builder.run_block(limit, self.whole.first_id, range),
+                Work::Round(limit) => builder.run_block(limit, range),
                 Work::Retry => builder.retry_hopeless(range),
                 Work::CountRoots => {
                     remains.look_at(range.clone(), &builder.surface, &mut builder.marks);

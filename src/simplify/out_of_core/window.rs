@@ -80,7 +80,7 @@ impl Window {
             (Parts::new(&blocks, &list), blocks.span())
         };
         let mut nodes = Nodes::new(Vec::new(), whole.extent, whole.unit);
-        (nodes.ids, nodes.next_id) = (Some(Vec::new()), next_id);
+        (nodes.ids, nodes.next_id, nodes.first_of_round) = (Some(Vec::new()), next_id, whole.first_id);
         let mut starts = Vec::with_capacity(list.len() + 1);
         let mut words = Vec::new();
         for &(block, _) in &list {
@@ -109,6 +109,7 @@ impl Window {
             parts.triangles,
             parts.triangle_ids,
             whole.live_triangles,
+            whole.unit,
         );
         let known = parts.originals.len();
         surface.quadrics[..known].copy_from_slice(&parts.quadrics);
@@ -118,7 +119,7 @@ impl Window {
         parts.trace.resize(vertices, NONE);
         (nodes.leaf_radius, nodes.top, nodes.trace) = (parts.leaf_radius, parts.top, parts.trace);
         let loaded_nodes = nodes.next();
-        let mut builder = Builder::new(surface, nodes, Marks::new(vertices), whole.merge, whole.unit);
+        let mut builder = Builder::new(surface, nodes, Marks::new(vertices), whole.merge);
         (builder.gives_up, builder.leans) = (whole.gives_up, whole.leans);
         builder.touched = Some(Vec::new());
         let candidates = &mut builder.candidates;
@@ -141,16 +142,16 @@ impl Window {
             loaded_nodes,
             words: Words::default(),
         };
-        window.hide_gains(whole.first_id);
+        window.hide_gains();
         Ok(window)
     }
 
     /// During a round, stars are as they were before it.
-    fn hide_gains(&mut self, first: u32) {
+    fn hide_gains(&mut self) {
         let nodes = &self.builder.nodes;
         for v in 0..self.originals.len() as u32 {
             let top = nodes.top[v as usize];
-            if nodes.is_from(top, first) {
+            if nodes.is_new(top) {
                 let surface = &mut self.builder.surface;
                 let before = surface.star_length(v);
                 surface.hide(v, |t| t.creator == top);

@@ -14,17 +14,19 @@ pub struct MappedSource {
 }
 
 impl MappedSource {
-    /// Maps a file. It must not be changed or cut short while it is mapped: formats here are written to a new file and
-    /// renamed, which leaves the old one as it is for those who have it open.
+    /// Maps a file. [`FileSource`](super::FileSource) asks for nothing of the kind that follows.
+    ///
+    /// # Safety
+    /// Nobody may change the file or cut it short while it is mapped, in this process or another: its bytes are lent as if
+    /// they could not change, and a page that is no longer there ends the process. Formats here are written to a new
+    /// file and renamed, which leaves the old one as it is for those who have it open; a copy over it does not.
     ///
     /// # Errors
     /// What the operating system says.
-    pub fn open(path: &Path) -> io::Result<Self> {
+    #[expect(unsafe_code, reason = "a file can not be mapped without; no command of this project does")]
+    pub unsafe fn open(path: &Path) -> io::Result<Self> {
         let file = File::open(path)?;
-        // SAFETY: the map is read only and private to this value. A file that another process changes meanwhile could
-        // show bytes that change under a reference; reads copy them out before anything looks at them, pages carry
-        // checksums, and nothing in this project ever writes to a file that it has published.
-        #[allow(unsafe_code, reason = "a file can not be mapped without")]
+        // SAFETY: that the file stays as it is has been promised by the caller.
         let map = unsafe { Mmap::map(&file)? };
         Ok(Self { name: path.display().to_string(), map })
     }
