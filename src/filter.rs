@@ -7,19 +7,25 @@
 //! # The error band
 //!
 //! Let `u = 2^-24`, `M = |e|` and let a hat mark what is computed. Rounding the eye and the difference displaces the
-//! centre by at most `2u (M + d)`. With that, `|d^ - d| <= 5u (M + d)`, `|a^ - a| <= 6u (M + d)`, `|R^ - R| <= 3u R`,
-//! and `b = r + a sin beta` is good to `9u (M + d + r)`. The half widths used,
+//! centre by at most `2u (M + d)`, and rounding the direction turns it by `u`. With that, `|d^ - d| <= 5u (M + d)`,
+//! `|a^ - a| <= 6u (M + d)`, `|R^ - R| <= 3u R`, and `b = r + a sin beta` is good to `9u (M + d + r)`.
+//!
+//! `p = |D x v|`, as in the predicate: the displaced and turned vectors have a product that is off by `3u (M + d)`; its
+//! components lose `u` of each of two products and of their difference, which is no more than `2.5u d` together, by
+//! Cauchy and Schwarz; the squares, their sum and the root lose `2.5u` of what they are. So `|p^ - p| <= 8u (M + d)`, and
+//! `p cos beta` is good to `10u (M + d)`, also where it is squared and compared with a square, which takes another `u`
+//! from either. `p cos beta` and `b` differ from the truth by less than `20u (M + d + r)` together, and so do
+//! `p cos beta - a sin beta` and `q = a cos beta + p sin beta`. The half widths used,
 //!
 //! ```text
 //! margin       = 16u (M + d^ + r)       of differences of lengths
 //! coarse band  = margin + 16u R^
-//! t            = d^ + r + margin
-//! visible band = 64u t (M + t)          of p^2 cos^2 beta - b^2
+//! cone band    = 2 margin               of p cos beta - b, of f - r and of q
 //! ```
 //!
-//! leave room for their own rounding. The last: `p^2 = d^2 - a^2` is good to `24u d (M + d) + 4u d^2`, and squaring
-//! `b +- margin` loses `2u t^2`. A tiny constant in the margin covers what underflows; what overflows is infinite or
-//! not a number, for which no comparison below is certain.
+//! leave room for their own rounding. A tiny constant in the margin covers what underflows; what overflows is infinite or
+//! not a number, for which no comparison below is certain. `p^` can overflow where `d^` does not: it is never longer, and
+//! is kept so.
 
 #[cfg(test)]
 use vertex_tree::Bounds;
@@ -29,9 +35,8 @@ use crate::motion::Course;
 use crate::packed::{Block, LANES};
 use crate::view::View;
 
-/// `16u` and `64u`.
+/// `16u`.
 const MARGIN: f32 = 16.0 / 16_777_216.0;
-const VISIBLE_BAND: f32 = 64.0 / 16_777_216.0;
 /// The square of this is a normal number, and products of it with the factors above are not lost among the
 /// subnormal ones.
 const TINY: f32 = 1e-18;
@@ -58,23 +63,23 @@ pub(crate) struct Lens {
 
 impl Lens {
     pub fn new(criterion: Criterion, view: &View) -> Self {
-        let eye = view.eye.as_vec3().to_array();
-        let k = view.k as f32;
+        let eye = view.eye().as_vec3().to_array();
+        let k = view.k() as f32;
         let (k_radius, k_eps, slope_radius, slope_eps) = match criterion {
             Criterion::ScreenError => (1.0, k, 0.0, 1.0),
             Criterion::SphereSize => (k, 0.0, 1.0, 0.0),
         };
         Self {
             eye,
-            direction: view.direction.as_vec3().to_array(),
-            cos2_beta: (view.cos_beta * view.cos_beta) as f32,
-            cos_beta: view.cos_beta as f32,
-            sin_beta: view.sin_beta as f32,
+            direction: view.direction().as_vec3().to_array(),
+            cos2_beta: (view.cos_beta() * view.cos_beta()) as f32,
+            cos_beta: view.cos_beta() as f32,
+            sin_beta: view.sin_beta() as f32,
             k_radius,
             k_eps,
             slope_radius,
             slope_eps,
-            eye_length: (view.eye.length() as f32).next_up(),
+            eye_length: (view.eye().length() as f32).next_up(),
         }
     }
 }
@@ -94,22 +99,21 @@ pub(crate) fn certainly<const WANTED: bool>(block: &Block, lenses: &[Lens]) -> [
             let margin = MARGIN * (lens.eye_length + d + r) + TINY;
             let coarse_band = margin + MARGIN * reach;
             let a = x * lens.direction[0] + y * lens.direction[1] + z * lens.direction[2];
-            let p2_cos2 = (d2 - a * a) * lens.cos2_beta;
+            let p2_cos2 = smaller(squared_across([x, y, z], lens.direction), d2) * lens.cos2_beta;
             let b = r + a * lens.sin_beta;
-            let t = d + r + margin;
-            let visible_band = VISIBLE_BAND * t * (lens.eye_length + t);
+            let cone_band = 2.0 * margin;
             if WANTED {
-                let low = b - margin;
+                let low = b - cone_band;
                 let coarse = d + coarse_band <= reach;
                 let inside = d + margin <= r;
                 // Ahead of the eye the line that bounds the cone is its nearest part.
-                let visible = (a >= margin) & (low >= 0.0) & (p2_cos2 + visible_band <= low * low);
+                let visible = (a >= margin) & (low >= 0.0) & (p2_cos2 <= low * low);
                 certain[i] |= u32::from(coarse & (inside | visible));
             } else {
-                let high = b + margin;
+                let high = b + cone_band;
                 let fine = d > reach + coarse_band;
                 // The line is at most as far away as the cone, so this holds behind the apex too.
-                let invisible = (high < 0.0) | (p2_cos2 > high * high + visible_band);
+                let invisible = (high < 0.0) | (p2_cos2 > high * high);
                 certain[i] &= u32::from(fine | invisible);
             }
         }
@@ -148,11 +152,8 @@ impl Rates {
 /// node's where the tag is even, otherwise a collapsible one's. Never late; 0 where the filter can not say.
 ///
 /// The time bounds of [`Criterion::earliest_unfold`] and [`Criterion::earliest_fold`], taken at that end of the error
-/// band which makes them earlier: for an unfolding the nearer one, for a folding the farther one. `p` is taken from that
-/// end of the band of `p^2`, as near the axis the root magnifies it.
-///
-/// Whether the apex or the line is the nearest part of the cone is certain where `q = a cos beta + p sin beta` is far
-/// enough from 0. The other end of the band of `p` is at most `sqrt(2 band) < 0.0028 (M + t)` away.
+/// band which makes them earlier: for an unfolding the nearer one, for a folding the farther one. Whether the apex or the
+/// line is the nearest part of the cone is certain where `q = a cos beta + p sin beta` is out of the band around 0.
 ///
 /// Rates that depend on the heading are multiplied by `d`, or rather a little less, so that one division serves.
 #[inline(always)]
@@ -173,18 +174,16 @@ pub(crate) fn earliest(block: &Block, lenses: &[Lens], rates: &Rates) -> [f32; L
             let margin = MARGIN * (lens.eye_length + d + r) + TINY;
             let coarse_band = margin + MARGIN * reach;
             let a = x * lens.direction[0] + y * lens.direction[1] + z * lens.direction[2];
-            let t = d + r + margin;
-            let band = VISIBLE_BAND * t * (lens.eye_length + t);
-            let p = larger(d2 - a * a + if unfolds { -band } else { band }, 0.0).sqrt();
+            let p = smaller(squared_across([x, y, z], lens.direction), d2).sqrt();
+            let cone_band = 2.0 * margin;
             // Behind the apex, the distance from the cone is that from the eye, and never less than that from its line.
             let line = p * lens.cos_beta - a * lens.sin_beta;
             let q = a * lens.cos_beta + p * lens.sin_beta;
-            let unsure = margin + 0.0028 * (lens.eye_length + t);
-            let is_line = if unfolds { q >= -unsure } else { q > unsure };
+            let is_line = if unfolds { q >= -cone_band } else { q > cone_band };
             let f = if is_line { line } else { d };
 
             let sign = if unfolds { 1.0 } else { -1.0 };
-            let sideways = frames(sign * (f - r) - 2.0 * margin, rate(any + omega * (d + margin)));
+            let sideways = frames(sign * (f - r) - cone_band, rate(any + omega * (d + margin)));
 
             let near = larger(d - margin, TINY);
             let along = sign * (x * heading[0] + y * heading[1] + z * heading[2]) + margin;
@@ -206,6 +205,13 @@ pub(crate) fn earliest(block: &Block, lenses: &[Lens], rates: &Rates) -> [f32; L
     }
     // It may be the division that has overflown, not the time that is infinite.
     earliest.map(|frames| smaller(frames, f32::MAX))
+}
+
+/// `|D x v|^2`.
+#[inline(always)]
+fn squared_across([x, y, z]: [f32; 3], [vx, vy, vz]: [f32; 3]) -> f32 {
+    let (px, py, pz) = (y * vz - z * vy, z * vx - x * vz, x * vy - y * vx);
+    px * px + py * py + pz * pz
 }
 
 /// A rate, and more than its computation and a division by it can have lost, also to underflow.
@@ -288,6 +294,7 @@ pub(crate) fn for_each_bit(mut mask: u32, mut f: impl FnMut(usize)) {
 }
 
 #[cfg(test)]
+#[expect(clippy::disallowed_methods, reason = "random views")]
 mod tests {
     use super::*;
     use glam::DVec3;
@@ -301,9 +308,11 @@ mod tests {
         fn is_never_certain_of_the_opposite(
             eye in prop::array::uniform3(prop_oneof![-10.0..10.0, -1e6..1e6, -1e-3..1e-3]),
             aim in prop::array::uniform3(-1.0..1.0_f64),
-            beta in 0.05..1.5_f64,
-            k in prop_oneof![Just(1.0), 1.0..2000.0, Just(1e30), Just(1e300)],
-            scale in prop_oneof![Just(1.0), Just(1e-25), Just(1e-15), Just(1e4), Just(1e25)],
+            beta in prop_oneof![0.05..1.5_f64, Just(1e-8), 1e-6..1e-3, 1.5..1.57],
+            k in prop_oneof![Just(1.0), 1.0..2000.0, Just(1e30), Just(1e300), Just(f64::MAX)],
+            scale in prop_oneof![
+                Just(1.0), Just(1e-25), Just(1e-15), Just(1e-42), Just(1e4), Just(1.8e19), Just(1e25), Just(1e37),
+            ],
             sphere_size in any::<bool>(),
             heading in prop::array::uniform3(-1.0..1.0_f64),
             rho in prop_oneof![Just(0.0), Just(1e-50), 0.01..10.0],
@@ -315,7 +324,7 @@ mod tests {
             let criterion = if sphere_size { Criterion::SphereSize } else { Criterion::ScreenError };
             let eye = DVec3::from(eye) * scale;
             let direction = DVec3::from(aim).normalize_or(DVec3::X);
-            let view = View { eye, direction, cos_beta: beta.cos(), sin_beta: beta.sin(), k };
+            let view = View::from_parts(eye, direction, beta.cos(), beta.sin(), k).unwrap();
             let heading = DVec3::from(heading).normalize_or_zero();
             let course = Course { heading, rho, stray, omega, kappa };
             let mut block = Block::EMPTY;
@@ -325,10 +334,15 @@ mod tests {
                 // About the direction at an angle near beta, or anywhere.
                 let side = direction.any_orthonormal_vector();
                 let side = glam::DQuat::from_axis_angle(direction, unit(s0) * 6.3) * side;
-                let angle = if s1 % 2 == 0 { beta * (1.0 + (unit(s2) - 0.5) * 1e-5) } else { unit(s2) * 3.2 };
+                let angle = match s1 % 4 {
+                    0 | 2 => beta * (1.0 + (unit(s2) - 0.5) * 1e-5),
+                    1 => unit(s2) * 3.2,
+                    // On the axis, and near it.
+                    _ => [0.0, unit(s2) * 1e-6, std::f64::consts::PI][s2 as usize % 3],
+                };
                 let distance = scale * unit(s3) * [1e-3, 1.0, 100.0, 1e5][s0 as usize % 4];
                 let center = eye + (direction * angle.cos() + side * angle.sin()) * distance;
-                let radius = distance * unit(s1) * [0.0, 1e-6, 1.0, 2.0][s1 as usize / 2 % 4];
+                let radius = distance * unit(s1) * [0.0, 1e-6, 1.0, 2.0][s1 as usize / 4 % 4];
                 // On the mark of the screen error, give or take a few times the precision.
                 let near = (distance - radius).max(0.0) / k * (1.0 + (unit(s0) - 0.5) * 1e-6);
                 let eps = if s2 % 2 == 0 { near } else { near * unit(s3) * 2.0 };

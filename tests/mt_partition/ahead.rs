@@ -24,7 +24,7 @@ fn file() -> Arc<MtFile> {
 
 fn view(eye: DVec3, direction: DVec3) -> View {
     let cos_beta = 0.8_f64;
-    View { eye, direction, cos_beta, sin_beta: (1.0 - cos_beta * cos_beta).sqrt(), k: 150.0 }
+    View::from_parts(eye, direction, cos_beta, (1.0 - cos_beta * cos_beta).sqrt(), 150.0).unwrap()
 }
 
 /// Around the ball, close to it, looking ahead and down.
