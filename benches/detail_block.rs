@@ -7,6 +7,8 @@
 //! of `bunny horse dragon happy sierra alps city laserscan`. Meshes are taken from `shared/data` beside the repository;
 //! `sierra` is one tile of the Sierra Nevada.
 
+#![expect(clippy::disallowed_methods, reason = "shapes to measure with")]
+
 use std::path::PathBuf;
 use std::sync::Arc;
 use std::time::{Duration, Instant};
@@ -203,7 +205,8 @@ fn deviation(log: &CollapseLog, file: &Arc<XfmFile>, path: &Path) -> (f64, f64) 
     let mut engine = engine(file, ActiveMesh::new(), path, Strategy::Event, 1.0);
     for frame in (60..path.frames.len()).step_by(path.frames.len() / 4) {
         engine.advance(&[view(path, frame)]).expect("the store is there");
-        let found = reference.deviation(&engine.mesh().to_mesh(), &path.camera(frame).expect("a camera"), LINES);
+        let found =
+            reference.deviation(&engine.mesh().to_mesh(), &path.camera(frame).expect("a camera"), LINES);
         for way in [&found.forward, &found.reverse] {
             (p99, most) = (p99.max(way.inner.p99), most.max(way.inner.max));
         }

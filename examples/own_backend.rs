@@ -13,6 +13,8 @@
 //!
 //! `cargo run --release --example own_backend`
 
+#![expect(clippy::disallowed_methods, reason = "a shape to show")]
+
 use foldfront::active_mesh::ActiveMesh;
 use foldfront::engine::{Engine, Settings};
 use foldfront::glam::DVec3;

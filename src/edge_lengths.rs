@@ -22,8 +22,8 @@ impl EdgeLengths {
             self.classes = vec![0; (f32::INFINITY.to_bits() >> CLASS_SHIFT) as usize + 1];
         }
         for (from, to) in [(0, 1), (1, 2), (2, 0)] {
-            let squares: [f64; 3] = array::from_fn(|axis| (corners[to][axis] - corners[from][axis]).powi(2));
-            let length = squares.iter().sum::<f64>().sqrt().min(f64::from(f32::MAX)) as f32;
+            let edge: [f64; 3] = array::from_fn(|axis| corners[to][axis] - corners[from][axis]);
+            let length = edge.iter().map(|x| x * x).sum::<f64>().sqrt().min(f64::from(f32::MAX)) as f32;
             if length > 0.0 {
                 self.classes[(length.to_bits() >> CLASS_SHIFT) as usize] += 1;
                 self.all += 1;
@@ -47,6 +47,7 @@ impl EdgeLengths {
 
 /// The power of two at or below a length, and 1 for 0: between 2^-100 and 2^100, so that its reciprocal is a single-precision
 /// number too.
+#[expect(clippy::disallowed_methods, reason = "powers of two are exact")]
 pub(crate) fn power_of_two(length: f64) -> f64 {
     // Every single-precision number but 0 has an exponent of its own in double precision.
     let exponent = if length > 0.0 { (length.to_bits() >> 52) as i32 - 1023 } else { 0 };
@@ -91,6 +92,7 @@ mod tests {
     }
 
     #[test]
+    #[expect(clippy::disallowed_methods, reason = "powers of two are exact")]
     fn powers_of_two_are_in_range() {
         for (length, power) in [(0.0, 1.0), (1.0, 1.0), (1.9, 1.0), (0.3, 0.25), (1e-45, 2.0_f64.powi(-100))]
         {

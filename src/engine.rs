@@ -422,7 +422,11 @@ impl<T: VertexTree, M: MeshSink> Engine<T, M> {
             _ => Limit::Error,
         };
         let moved = self.before.len() != self.views.len()
-            || self.before.iter().zip(&self.views).any(|(b, v)| b.eye() != v.eye() || b.direction() != v.direction());
+            || self
+                .before
+                .iter()
+                .zip(&self.views)
+                .any(|(b, v)| b.eye() != v.eye() || b.direction() != v.direction());
         self.steering.observe(triangles, select + std::mem::take(&mut self.drawing_time), moved);
         Ok(FrameReport {
             select,

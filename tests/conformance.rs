@@ -1,6 +1,8 @@
 //! Every backend with every exact strategy against the brute-force cut, in every frame of long walks over built-in
 //! scenes and real meshes.
 
+#![expect(clippy::disallowed_methods, reason = "random shapes and motions, or figures to compare with")]
+
 mod common;
 
 use std::f64::consts::PI;
@@ -140,7 +142,8 @@ fn a_pan_of_a_million_frames() {
         if frame == 10 * ALL_BACKENDS {
             table.go_on_with_the_first();
         }
-        view = view.with_direction((DQuat::from_axis_angle(axis, 1e-5) * view.direction()).normalize()).unwrap();
+        view =
+            view.with_direction((DQuat::from_axis_angle(axis, 1e-5) * view.direction()).normalize()).unwrap();
         table.advance(&[placed.view(view)]);
     }
     eprintln!("{:?}", table.totals);

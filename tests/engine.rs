@@ -1,5 +1,7 @@
 //! Every strategy against the brute-force cut, on hierarchies and motions that are as nasty as random can make them.
 
+#![expect(clippy::disallowed_methods, reason = "random shapes and motions, or figures to compare with")]
+
 mod common;
 
 use std::collections::BTreeSet;
@@ -109,7 +111,9 @@ fn a_slow_pan_flips_every_node_in_its_frame() {
     let axis = view.direction().any_orthogonal_vector().normalize();
     let (mut changes, mut tests) = (0, 0);
     for frame in 0..1_000_000 {
-        view = view.with_direction((glam::DQuat::from_axis_angle(axis, 1e-5) * view.direction()).normalize()).unwrap();
+        view = view
+            .with_direction((glam::DQuat::from_axis_angle(axis, 1e-5) * view.direction()).normalize())
+            .unwrap();
         let report = engine.advance(&[view]).unwrap();
         changes += report.unfolds + report.folds;
         tests += report.tests;

@@ -1,5 +1,7 @@
 //! What the engine foresees against what comes.
 
+#![expect(clippy::disallowed_methods, reason = "random shapes and motions, or figures to compare with")]
+
 mod common;
 
 use std::collections::{BTreeMap, HashMap};
@@ -178,7 +180,9 @@ fn a_jump_is_not_carried_on() {
     let (_, hierarchy) = hierarchy(4, 60);
     let settings = Settings { rho: 0.01, omega: 0.01, ..Settings::default() };
     let mut engine = walker(&hierarchy, settings, 4);
-    let view = |eye: DVec3| random_view(&mut Random(1)).with_eye(eye).and_then(|v| v.with_direction(-eye.normalize())).unwrap();
+    let view = |eye: DVec3| {
+        random_view(&mut Random(1)).with_eye(eye).and_then(|v| v.with_direction(-eye.normalize())).unwrap()
+    };
     let eye = DVec3::new(0.3, 0.4, 1.1);
     engine.advance(&[view(eye)]).unwrap();
     engine.advance(&[view(eye)]).unwrap();

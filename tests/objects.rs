@@ -1,5 +1,7 @@
 //! Several objects in one scene: placements, scene files, and a hundred objects under one budget.
 
+#![expect(clippy::disallowed_methods, reason = "random shapes and motions, or figures to compare with")]
+
 mod common;
 
 use std::path::Path;
@@ -48,7 +50,9 @@ fn a_placement_is_what_its_matrix_says() {
         let own = placement.view(&view).unwrap();
         let (there, here) = (placement.place(point) - view.eye(), point - own.eye());
         assert!((there.length() - placement.scale * here.length()).abs() < 1e-9);
-        assert!((there.normalize().dot(view.direction()) - here.normalize().dot(own.direction())).abs() < 1e-9);
+        assert!(
+            (there.normalize().dot(view.direction()) - here.normalize().dot(own.direction())).abs() < 1e-9
+        );
         assert_eq!((own.cos_beta(), own.k()), (view.cos_beta(), view.k()));
     }
 }

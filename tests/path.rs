@@ -1,5 +1,7 @@
 //! Walkthroughs: files, the recorded paths, and trajectories brought to meshes.
 
+#![expect(clippy::disallowed_methods, reason = "random shapes and motions, or figures to compare with")]
+
 use std::path::Path as FilePath;
 
 use foldfront::path::{Path, PathError, Pose, generate, recorded};

@@ -1,6 +1,8 @@
 //! Trajectories as loggers write them: each comes to the same path as a plain one, or to an error that names the reason;
 //! and those that keep their place.
 
+#![expect(clippy::disallowed_methods, reason = "random shapes and motions, or figures to compare with")]
+
 use std::path::{Path as FilePath, PathBuf};
 
 use foldfront::path::import::{ImportError, Mode, Options, Warning, import, import_text, import_warning};

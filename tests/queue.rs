@@ -1,5 +1,7 @@
 //! The event queue against an ordered map, and the time bounds against random motion.
 
+#![expect(clippy::disallowed_methods, reason = "random shapes and motions, or figures to compare with")]
+
 use std::collections::BTreeMap;
 use std::collections::btree_map::Entry;
 

@@ -14,6 +14,8 @@
 //!
 //! Frames are settled: each waits for its pages, and its cut is compared between modes; another cut fails the benchmark.
 
+#![expect(clippy::disallowed_methods, reason = "shapes to measure with")]
+
 mod figures;
 mod selection;
 mod within;
@@ -121,7 +123,9 @@ fn turning(mesh: &Mesh) -> Path {
 }
 
 fn views(path: &Path) -> Vec<View> {
-    (0..path.frames.len()).map(|frame| path.view(frame, theta_of_pixels(1.0, 1080)).expect("a view")).collect()
+    (0..path.frames.len())
+        .map(|frame| path.view(frame, theta_of_pixels(1.0, 1080)).expect("a view"))
+        .collect()
 }
 
 fn tree(file: &Arc<MtFile>, cache: CacheMode) -> MtTree {

@@ -9,8 +9,8 @@ use std::time::Duration;
 
 use mt_partition::{MtError, MtFile, MtTree, Reader};
 use rustc_hash::FxHashMap;
-use vertex_tree::source::FileSource;
 use vertex_tree::NullSink;
+use vertex_tree::source::FileSource;
 
 use super::{Objects, ObjectsError, Placement, SceneFileError, read_scene};
 use crate::engine::{FrameReport, Settings};

@@ -1,4 +1,5 @@
 //! What several test files share: the table of backends, real data, a generator of random logs and views.
+#![expect(clippy::disallowed_methods, reason = "random shapes and motions, or figures to compare with")]
 #![allow(dead_code)]
 
 pub mod backends;
@@ -122,5 +123,6 @@ pub fn random_step(view: &mut View, random: &mut Random) {
 pub fn turn(view: &mut View, angle: f64, random: &mut Random) {
     let axis = view.direction().any_orthogonal_vector();
     let axis = DQuat::from_axis_angle(view.direction(), 6.0 * random.unit()) * axis.normalize();
-    *view = view.with_direction((DQuat::from_axis_angle(axis, angle) * view.direction()).normalize()).unwrap();
+    *view =
+        view.with_direction((DQuat::from_axis_angle(axis, angle) * view.direction()).normalize()).unwrap();
 }

@@ -1,5 +1,7 @@
 //! The normal-cone test as a part of the criterion.
 
+#![expect(clippy::disallowed_methods, reason = "random shapes and motions, or figures to compare with")]
+
 use std::sync::Arc;
 
 use detail_block::{Arrangement, Io, XfmFile, XfmTree};

@@ -1,5 +1,7 @@
 //! What fetches nodes ahead, on stores on virtual time: the same replay has the same misses.
 
+#![expect(clippy::disallowed_methods, reason = "random shapes and motions, or figures to compare with")]
+
 use std::sync::Arc;
 use std::time::Duration;
 

@@ -1,5 +1,7 @@
 //! The partitioned multi-triangulation: what is displayed, how it pages, and what it does with bad stores and bad files.
 
+#![expect(clippy::disallowed_methods, reason = "random shapes and motions, or figures to compare with")]
+
 mod ahead;
 #[path = "../common/mod.rs"]
 mod common;

@@ -1,5 +1,7 @@
 //! Hierarchy construction: on real meshes, and on small ones made to be difficult.
 
+#![expect(clippy::disallowed_methods, reason = "random shapes and motions, or figures to compare with")]
+
 #[path = "../common/mod.rs"]
 mod common;
 mod out_of_core;

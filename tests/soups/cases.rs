@@ -1,5 +1,7 @@
 //! Meshes that construction once did not end on, or did next to nothing for.
 
+#![expect(clippy::disallowed_methods, reason = "random shapes and motions, or figures to compare with")]
+
 use std::path::{Path, PathBuf};
 
 use foldfront::compare::{Options, Subject};

@@ -244,7 +244,10 @@ fn around(samples: &[Sample], ground: &Ground) -> Vec<DVec3> {
 }
 
 /// Looks at a point, with the quick part of the recorded rotation on top.
-#[expect(clippy::disallowed_methods, reason = "an imported path is written to a file, which is what is replayed")]
+#[expect(
+    clippy::disallowed_methods,
+    reason = "an imported path is written to a file, which is what is replayed"
+)]
 fn watching(samples: &[Sample], positions: &[DVec3], middle: DVec3, rate: f64) -> Vec<DQuat> {
     const LARGEST: f64 = 8.0 * PI / 180.0;
     let shake = shaking(samples, rate);
