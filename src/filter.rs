@@ -27,9 +27,6 @@
 //! not a number, for which no comparison below is certain. `p^` can overflow where `d^` does not: it is never longer, and
 //! is kept so.
 
-#[cfg(test)]
-use vertex_tree::Bounds;
-
 use crate::criterion::Criterion;
 use crate::motion::Course;
 use crate::packed::{Block, LANES};
@@ -294,87 +291,4 @@ pub(crate) fn for_each_bit(mut mask: u32, mut f: impl FnMut(usize)) {
 }
 
 #[cfg(test)]
-#[expect(clippy::disallowed_methods, reason = "random views")]
-mod tests {
-    use super::*;
-    use glam::DVec3;
-    use proptest::prelude::*;
-
-    proptest! {
-        #![proptest_config(ProptestConfig::with_cases(4000))]
-
-        /// Wherever the filter is certain the predicate agrees, near the marks above all.
-        #[test]
-        fn is_never_certain_of_the_opposite(
-            eye in prop::array::uniform3(prop_oneof![-10.0..10.0, -1e6..1e6, -1e-3..1e-3]),
-            aim in prop::array::uniform3(-1.0..1.0_f64),
-            beta in prop_oneof![0.05..1.5_f64, Just(1e-8), 1e-6..1e-3, 1.5..1.57],
-            k in prop_oneof![Just(1.0), 1.0..2000.0, Just(1e30), Just(1e300), Just(f64::MAX)],
-            scale in prop_oneof![
-                Just(1.0), Just(1e-25), Just(1e-15), Just(1e-42), Just(1e4), Just(1.8e19), Just(1e25), Just(1e37),
-            ],
-            sphere_size in any::<bool>(),
-            heading in prop::array::uniform3(-1.0..1.0_f64),
-            rho in prop_oneof![Just(0.0), Just(1e-50), 0.01..10.0],
-            stray in prop_oneof![Just(0.0), Just(1e-50), 0.001..10.0],
-            omega in prop_oneof![Just(0.0), 1e-6..0.1],
-            kappa in prop_oneof![Just(0.0), 0.1..10.0],
-            seeds in prop::array::uniform16((any::<u32>(), any::<u32>(), any::<u32>(), any::<u32>())),
-        ) {
-            let criterion = if sphere_size { Criterion::SphereSize } else { Criterion::ScreenError };
-            let eye = DVec3::from(eye) * scale;
-            let direction = DVec3::from(aim).normalize_or(DVec3::X);
-            let view = View::from_parts(eye, direction, beta.cos(), beta.sin(), k).unwrap();
-            let heading = DVec3::from(heading).normalize_or_zero();
-            let course = Course { heading, rho, stray, omega, kappa };
-            let mut block = Block::EMPTY;
-            let mut all = Vec::new();
-            for (lane, &(s0, s1, s2, s3)) in seeds.iter().enumerate() {
-                let unit = |s: u32| f64::from(s) / f64::from(u32::MAX);
-                // About the direction at an angle near beta, or anywhere.
-                let side = direction.any_orthonormal_vector();
-                let side = glam::DQuat::from_axis_angle(direction, unit(s0) * 6.3) * side;
-                let angle = match s1 % 4 {
-                    0 | 2 => beta * (1.0 + (unit(s2) - 0.5) * 1e-5),
-                    1 => unit(s2) * 3.2,
-                    // On the axis, and near it.
-                    _ => [0.0, unit(s2) * 1e-6, std::f64::consts::PI][s2 as usize % 3],
-                };
-                let distance = scale * unit(s3) * [1e-3, 1.0, 100.0, 1e5][s0 as usize % 4];
-                let center = eye + (direction * angle.cos() + side * angle.sin()) * distance;
-                let radius = distance * unit(s1) * [0.0, 1e-6, 1.0, 2.0][s1 as usize / 4 % 4];
-                // On the mark of the screen error, give or take a few times the precision.
-                let near = (distance - radius).max(0.0) / k * (1.0 + (unit(s0) - 0.5) * 1e-6);
-                let eps = if s2 % 2 == 0 { near } else { near * unit(s3) * 2.0 };
-                let limit = |x: f64| (x as f32).clamp(-1e38, 1e38);
-                let bounds = Bounds {
-                    center: center.to_array().map(limit),
-                    radius: limit(radius),
-                    eps: limit(eps),
-                };
-                block.set(lane, &bounds, 0);
-                all.push(bounds);
-            }
-            let lenses = Lenses::new(criterion, &[view]).unwrap();
-            let certainly_wanted = certainly::<true>(&block, lenses.as_slice());
-            let certainly_unwanted = certainly::<false>(&block, lenses.as_slice());
-            for (lane, bounds) in all.iter().enumerate() {
-                let wanted = criterion.unfold(&[view], bounds);
-                prop_assert!(certainly_wanted[lane] == 0 || wanted, "{bounds:?}");
-                prop_assert!(certainly_unwanted[lane] == 0 || !wanted, "{bounds:?}");
-                // No time bound may be later than the one in f64, which leaves next to nothing to rounding, nor say
-                // that a node that should change need not.
-                for fold in [false, true] {
-                    block.tag[lane] = u32::from(fold);
-                    let filtered = f64::from(earliest(&block, lenses.as_slice(), &Rates::new(&course))[lane]);
-                    let exact = if fold {
-                        criterion.earliest_fold(&[view], &course, bounds)
-                    } else {
-                        criterion.earliest_unfold(&[view], &course, bounds)
-                    };
-                    prop_assert!(filtered <= exact, "{bounds:?}, fold {fold}: {filtered} > {exact}");
-                }
-            }
-        }
-    }
-}
+mod tests;

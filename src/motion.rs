@@ -169,7 +169,8 @@ impl<'a> Travel<'a> {
             let turned = 2.0 * libm::atan2(chord, (a.direction() + b.direction()).length());
             let steered = (a.k() - b.k()).abs();
             // Below, and wherever a largest is looked for, what is not a number would be passed over.
-            if !(turned.is_finite() && steered.is_finite() && (a.eye() - b.eye()).is_finite()) {
+            let compared = (a.eye() - b.eye()) + (a.direction() - b.direction());
+            if !(compared.is_finite() && turned.is_finite() && steered.is_finite()) {
                 return None;
             }
             travel.turned = travel.turned.max(turned);

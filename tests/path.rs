@@ -42,6 +42,10 @@ fn errors_name_file_line_and_value() {
         ("0 1 2 x 0 0 0 1", "dir/test.path:1: \"x\" is not a finite number"),
         ("0 1 NaN 3 0 0 0 1", "dir/test.path:1: \"NaN\" is not a finite number"),
         ("0 1 2 1e999 0 0 0 1", "dir/test.path:1: \"1e999\" is not a finite number"),
+        (
+            "0 1 2 1e160 0 0 0 1",
+            "dir/test.path:1: the eye [1.0, 2.0, 1e160] is not finite, or farther away than 1e150",
+        ),
         ("0 1 2 3 0 0 0 0", "dir/test.path:1: the quaternion [0.0, 0.0, 0.0, 0.0] is no rotation"),
         ("0 1 2 3 0 0 0 1e200", "dir/test.path:1: the quaternion [0.0, 0.0, 0.0, 1e200] is no rotation"),
         ("1 1 2 3 0 0 0 1\n1 1 2 3 0 0 0 1", "dir/test.path:2: the time 1 is not after 1"),
@@ -84,6 +88,28 @@ fn a_path_survives_a_file() {
     path.write(&file).unwrap();
     assert_eq!(Path::read(&file).unwrap(), path);
     assert!(matches!(path.write(&folder.path().join("no/walk.path")), Err(PathError::Write { .. })));
+}
+
+/// The fields of a path are anybody's: what is wrong with a camera is said where one is made, and nothing wrong is written.
+#[test]
+fn a_path_made_by_hand_is_checked_where_it_is_used() {
+    let folder = tempfile::tempdir().unwrap();
+    let good = parse(GOOD).unwrap();
+    assert!(good.view(0, 0.01).is_ok());
+    let wrong: [fn(&mut Path); 6] = [
+        |path| path.fov_y = f64::NAN,
+        |path| path.aspect = 0.0,
+        |path| path.frames[1].position.y = f64::INFINITY,
+        |path| path.frames[1].position.y = 1e151,
+        |path| path.frames[1].orientation = DQuat::from_xyzw(0.0, 0.0, 0.0, f64::NAN),
+        |path| path.frames[1].orientation = DQuat::from_xyzw(0.0, 0.0, 0.0, 0.0),
+    ];
+    for spoil in wrong {
+        let mut path = good.clone();
+        spoil(&mut path);
+        assert!(path.camera(1).is_err() && path.view(1, 0.01).is_err(), "{path:?}");
+        assert!(path.write(&folder.path().join("walk.path")).is_err(), "{path:?}");
+    }
 }
 
 #[test]
