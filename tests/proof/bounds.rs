@@ -123,7 +123,7 @@ impl Case {
         let mut steps = Vec::new();
         for way in [self.to_center, -self.to_center, self.inwards, -self.inwards, DVec3::ZERO] {
             for along in [0.0, 1.0] {
-                for turn in [0.0, 1.0, -1.0] {
+                for turn in [0.0_f64, 1.0, -1.0] {
                     for steer in [0.0, 1.0, -1.0] {
                         steps.push(Step {
                             moved: way * course.stray + along * course.heading * course.rho,
@@ -208,7 +208,7 @@ fn a_node_near_the_axis_is_where_it_is() {
         let to_center = random.direction();
         let side = to_center.any_orthonormal_vector();
         let distance = 1.0 + random.unit();
-        let beta = 1e-8;
+        let beta = 1e-8_f64;
         let alpha = 3e-8 * random.unit();
         let direction = (to_center * alpha.cos() + side * alpha.sin()).normalize();
         let view = View::from_parts(-to_center * distance, direction, beta.cos(), beta.sin(), 10.0).unwrap();
