@@ -43,9 +43,9 @@
 //! that. Construction leaves `2^-20 r` between the spheres of parents and children, so for `d + R` up to `10^7 r`
 //! and more it can not.
 //!
-//! A [`View`] is finite, with `k` of at least 1, and [bounds](Bounds::is_sane) are; so `R` is at least `r`, it may be
-//! infinite, and it is a number. Nothing else is not one either: squares of lengths end at `10^302`, but that of `R`,
-//! with which nothing is done but to compare.
+//! A [`View`] is finite, with `k` of at least 1, and so are [bounds](Bounds::is_sane): `R` is a number, at least `r`. It
+//! may be infinite, and its square too, with which nothing is done but to compare. All else is finite, as squares of
+//! lengths end at `10^302`.
 
 use vertex_tree::Bounds;
 

@@ -57,6 +57,24 @@ fn a_placement_is_what_its_matrix_says() {
     }
 }
 
+/// Anybody may make a placement: one that leaves an eye nowhere is an error, of the object that has it.
+#[test]
+fn a_view_that_is_none_of_an_object_is_refused() {
+    let mut random = Random(2);
+    let view = random_view(&mut random);
+    let good = random_placement(&mut random, 5.0);
+    for wrong in [
+        Placement { scale: 0.0, ..good },
+        Placement { scale: 1e-160, ..good },
+        Placement { scale: f64::NAN, ..good },
+        Placement { translation: DVec3::splat(1e151), ..good },
+        Placement { rotation: DQuat::from_xyzw(0.0, 0.0, 0.0, 0.0), ..good },
+    ] {
+        assert!(wrong.view(&view).is_err(), "{wrong:?}");
+    }
+    assert!(good.view(&view).is_ok());
+}
+
 #[test]
 fn other_matrices_are_refused() {
     let refused = |change: fn(&mut [f64; 12])| {

@@ -79,6 +79,7 @@ impl Party {
         for engine in &mut self.engines {
             let report = engine.advance(views).unwrap();
             self.changes += report.unfolds + report.folds;
+            // The place for `engine.assert_well_formed()`.
             if is_checked {
                 let name = engine.settings().strategy.name();
                 let difference = self.oracle.compare(engine);

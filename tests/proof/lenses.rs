@@ -15,7 +15,7 @@ const SCALES: [f64; 9] = [1e-42, 1e-40, 1e-30, 1e-15, 1.0, 1e9, 1e25, 1e36, 1e37
 
 /// From 1e-8 radians to 180 degrees.
 fn lenses() -> [f64; 8] {
-    [1e-8, 1e-6, 1e-3, 0.3, 1.0, 2.6, 3.14, PI.next_down()]
+    [1e-8, 1e-6, 1e-3, 0.3, 1.0, 2.6, 3.13, PI.next_down()]
 }
 
 /// One frame of a walk: at rest, slow, fast, turning by as much as a narrow lens does and by more, elsewhere.
