@@ -10,22 +10,22 @@
 //! centre by at most `2u (M + d)`, and rounding the direction turns it by `u`. With that, `|d^ - d| <= 5u (M + d)`,
 //! `|a^ - a| <= 6u (M + d)`, `|R^ - R| <= 3u R`, and `b = r + a sin beta` is good to `9u (M + d + r)`.
 //!
-//! `p = |D x v|`, as in the predicate: the displaced and turned vectors have a product that is off by `3u (M + d)`; its
-//! components lose `u` of each of two products and of their difference, which is no more than `2.5u d` together, by
-//! Cauchy and Schwarz; the squares, their sum and the root lose `2.5u` of what they are. So `|p^ - p| <= 8u (M + d)`, and
-//! `p cos beta` is good to `10u (M + d)`, also where it is squared and compared with a square, which takes another `u`
-//! from either. `p cos beta` and `b` differ from the truth by less than `20u (M + d + r)` together, and so do
-//! `p cos beta - a sin beta` and `q = a cos beta + p sin beta`. The half widths used,
+//! `p = |D x v|`, as in the predicate, and that is `|D - a v|` with three operations less. The displacement, `a^` and the
+//! turn put this vector off by `9u (M + d)`, rounding of the products and of the differences by `2u d`; the squares,
+//! their sum and the root lose `2.5u` of what they are. So `|p^ - p| <= 14u (M + d)`, and `p cos beta` is good to
+//! `16u (M + d)`, also where it is squared and compared with a square, which takes another `u` from either. `p cos beta`
+//! and `b` differ from the truth by less than `27u (M + d + r)` together, and so do `p cos beta - a sin beta` and
+//! `q = a cos beta + p sin beta`. The half widths used,
 //!
 //! ```text
 //! margin       = 16u (M + d^ + r)       of differences of lengths
-//! coarse band  = margin + 16u R^
+//! coarse band  = margin + 16u R^        of d - R
 //! cone band    = 2 margin               of p cos beta - b, of f - r and of q
 //! ```
 //!
 //! leave room for their own rounding. A tiny constant in the margin covers what underflows; what overflows is infinite or
-//! not a number, for which no comparison below is certain. `p^` can overflow where `d^` does not: it is never longer, and
-//! is kept so.
+//! not a number, for which no comparison below is certain; a `k` that single precision can not hold is made so. `p^` can
+//! overflow where `d^` does not: it is never longer, and is kept so.
 
 use crate::criterion::Criterion;
 use crate::motion::Course;
@@ -54,14 +54,15 @@ pub(crate) struct Lens {
     /// `dR/dk` likewise.
     slope_radius: f32,
     slope_eps: f32,
-    /// `M`, rounded up.
-    eye_length: f32,
+    /// The margin at the eye.
+    margin: f32,
 }
 
 impl Lens {
     pub fn new(criterion: Criterion, view: &View) -> Self {
         let eye = view.eye().as_vec3().to_array();
-        let k = view.k() as f32;
+        // An infinite one would make R infinite, also of the smallest error.
+        let k = Some(view.k() as f32).filter(|k| k.is_finite()).unwrap_or(f32::NAN);
         let (k_radius, k_eps, slope_radius, slope_eps) = match criterion {
             Criterion::ScreenError => (1.0, k, 0.0, 1.0),
             Criterion::SphereSize => (k, 0.0, 1.0, 0.0),
@@ -76,7 +77,7 @@ impl Lens {
             k_eps,
             slope_radius,
             slope_eps,
-            eye_length: (view.eye().length() as f32).next_up(),
+            margin: MARGIN * (view.eye().length() as f32).next_up() + TINY,
         }
     }
 }
@@ -93,22 +94,21 @@ pub(crate) fn certainly<const WANTED: bool>(block: &Block, lenses: &[Lens]) -> [
             let d2 = x * x + y * y + z * z;
             let d = d2.sqrt();
             let reach = r * lens.k_radius + eps * lens.k_eps;
-            let margin = MARGIN * (lens.eye_length + d + r) + TINY;
-            let coarse_band = margin + MARGIN * reach;
+            let margin = MARGIN * (d + r) + lens.margin;
             let a = x * lens.direction[0] + y * lens.direction[1] + z * lens.direction[2];
-            let p2_cos2 = smaller(squared_across([x, y, z], lens.direction), d2) * lens.cos2_beta;
+            let p2_cos2 = smaller(squared_across([x, y, z], a, lens.direction), d2) * lens.cos2_beta;
             let b = r + a * lens.sin_beta;
             let cone_band = 2.0 * margin;
             if WANTED {
                 let low = b - cone_band;
-                let coarse = d + coarse_band <= reach;
+                let coarse = d + margin <= reach * (1.0 - MARGIN);
                 let inside = d + margin <= r;
                 // Ahead of the eye the line that bounds the cone is its nearest part.
                 let visible = (a >= margin) & (low >= 0.0) & (p2_cos2 <= low * low);
                 certain[i] |= u32::from(coarse & (inside | visible));
             } else {
                 let high = b + cone_band;
-                let fine = d > reach + coarse_band;
+                let fine = d > reach * (1.0 + MARGIN) + margin;
                 // The line is at most as far away as the cone, so this holds behind the apex too.
                 let invisible = (high < 0.0) | (p2_cos2 > high * high);
                 certain[i] &= u32::from(fine | invisible);
@@ -168,10 +168,10 @@ pub(crate) fn earliest(block: &Block, lenses: &[Lens], rates: &Rates) -> [f32; L
             let d = d2.sqrt();
             let reach = r * lens.k_radius + eps * lens.k_eps;
             let steered = kappa * (r * lens.slope_radius + eps * lens.slope_eps);
-            let margin = MARGIN * (lens.eye_length + d + r) + TINY;
+            let margin = MARGIN * (d + r) + lens.margin;
             let coarse_band = margin + MARGIN * reach;
             let a = x * lens.direction[0] + y * lens.direction[1] + z * lens.direction[2];
-            let p = smaller(squared_across([x, y, z], lens.direction), d2).sqrt();
+            let p = smaller(squared_across([x, y, z], a, lens.direction), d2).sqrt();
             let cone_band = 2.0 * margin;
             // Behind the apex, the distance from the cone is that from the eye, and never less than that from its line.
             let line = p * lens.cos_beta - a * lens.sin_beta;
@@ -204,10 +204,10 @@ pub(crate) fn earliest(block: &Block, lenses: &[Lens], rates: &Rates) -> [f32; L
     earliest.map(|frames| smaller(frames, f32::MAX))
 }
 
-/// `|D x v|^2`.
+/// `|D x v|^2 = |D - a v|^2`.
 #[inline(always)]
-fn squared_across([x, y, z]: [f32; 3], [vx, vy, vz]: [f32; 3]) -> f32 {
-    let (px, py, pz) = (y * vz - z * vy, z * vx - x * vz, x * vy - y * vx);
+fn squared_across([x, y, z]: [f32; 3], a: f32, [vx, vy, vz]: [f32; 3]) -> f32 {
+    let (px, py, pz) = (x - a * vx, y - a * vy, z - a * vz);
     px * px + py * py + pz * pz
 }
 
@@ -255,7 +255,7 @@ impl Lenses {
             k_eps: 0.0,
             slope_radius: 0.0,
             slope_eps: 0.0,
-            eye_length: 0.0,
+            margin: 0.0,
         };
         let mut lenses = [blank; MOST_VIEWS];
         for (i, view) in views.iter().enumerate() {

@@ -15,7 +15,7 @@ proptest! {
         eye in prop::array::uniform3(prop_oneof![-10.0..10.0, -1e6..1e6, -1e-3..1e-3]),
         aim in prop::array::uniform3(-1.0..1.0_f64),
         beta in prop_oneof![0.05..1.5_f64, Just(1e-8), 1e-6..1e-3, 1.5..1.57],
-        k in prop_oneof![Just(1.0), 1.0..2000.0, Just(1e30), Just(1e300), Just(f64::MAX)],
+        k in prop_oneof![Just(1.0), 1.0..2000.0, Just(1e30), Just(1e40), Just(1e300), Just(f64::MAX)],
         scale in prop_oneof![
             Just(1.0), Just(1e-25), Just(1e-15), Just(1e-42), Just(1e4), Just(1.8e19), Just(1e25), Just(1e37),
         ],
@@ -136,7 +136,7 @@ fn extreme_values_have_one_meaning() {
     for eye in eyes.map(DVec3::from) {
         for direction in [DVec3::NEG_Z, DVec3::X, DVec3::new(0.6, 0.0, 0.8)] {
             for [cos_beta, sin_beta] in cones {
-                for k in [1.0, 1e10, 1e300, f64::MAX] {
+                for k in [1.0, 1e10, 1e38, 1e39, 1e43, 1e300, f64::MAX] {
                     let view = View::from_parts(eye, direction, cos_beta, sin_beta, k).unwrap();
                     assert_one_meaning(Criterion::ScreenError, &view, &nodes);
                     assert_one_meaning(Criterion::SphereSize, &view, &nodes);
