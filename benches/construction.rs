@@ -3,6 +3,8 @@
 //! A rough terrain of this file's own making is always there; real meshes are measured where the folder `shared/data`
 //! lies beside the repository.
 
+#![expect(clippy::disallowed_methods, reason = "shapes to measure with")]
+
 use std::path::Path;
 use std::time::Duration;
 

@@ -7,6 +7,8 @@
 //! of `bunny horse dragon happy sierra alps city laserscan`. Meshes are taken from `shared/data` beside the repository;
 //! `sierra` is one tile of the Sierra Nevada.
 
+#![expect(clippy::disallowed_methods, reason = "shapes to measure with")]
+
 use std::path::PathBuf;
 use std::sync::Arc;
 use std::time::{Duration, Instant};
@@ -55,7 +57,7 @@ fn subject(name: &str) -> Option<(Mesh, Vec<Path>)> {
         return None;
     }
     let mesh = mesh_io::read(&files, &mut |_, _| {}).expect("the data are readable");
-    let path = around(&mesh);
+    let path = around(&mesh).expect("a place for a camera");
     Some((mesh, vec![path]))
 }
 
@@ -102,7 +104,7 @@ fn settings(path: &Path, strategy: Strategy) -> Settings {
 }
 
 fn view(path: &Path, frame: usize) -> View {
-    View::new(&path.camera(frame), theta_of_pixels(1.0, LINES))
+    path.view(frame, theta_of_pixels(1.0, LINES)).expect("a view")
 }
 
 fn ms(time: Duration, frames: usize) -> f64 {
@@ -248,7 +250,8 @@ fn deviation(log: &CollapseLog, file: &Arc<XfmFile>, path: &Path) -> (f64, f64) 
     let mut engine = engine(file, ActiveMesh::new(), path, Strategy::Event, 1.0);
     for frame in (60..path.frames.len()).step_by(path.frames.len() / 4) {
         engine.advance(&[view(path, frame)]).expect("the store is there");
-        let found = reference.deviation(&engine.mesh().to_mesh(), &path.camera(frame), LINES);
+        let found =
+            reference.deviation(&engine.mesh().to_mesh(), &path.camera(frame).expect("a camera"), LINES);
         for way in [&found.forward, &found.reverse] {
             (p99, most) = (p99.max(way.inner.p99), most.max(way.inner.max));
         }
@@ -261,11 +264,11 @@ fn displacement(log: &CollapseLog, quantised: &CollapseLog, path: &Path) -> f64 
     let lines = f64::from(LINES) / 2.0;
     let mut most = 0.0_f64;
     for frame in (60..path.frames.len()).step_by(path.frames.len() / 4) {
-        let camera = path.camera(frame);
+        let camera = path.camera(frame).expect("a camera");
         for (p, q) in log.mesh.positions.iter().zip(&quantised.mesh.positions) {
             let [p, q] = [p, q].map(|p| foldfront::glam::DVec3::from(p.map(f64::from)));
-            let d = (p - camera.position).length();
-            most = most.max(p.distance(q) / ((camera.fov_y / 2.0).tan() * d) * lines);
+            let d = (p - camera.position()).length();
+            most = most.max(p.distance(q) / ((camera.fov_y() / 2.0).tan() * d) * lines);
         }
     }
     most
@@ -279,12 +282,12 @@ fn steered(name: &str, file: &Arc<XfmFile>, path: &Path) {
         let mut times = Vec::new();
         let (mut least, mut most, mut triangles) = (f64::MAX, 0.0_f64, (u64::MAX, 0));
         for frame in 0..path.frames.len() {
-            let asked = View::new(&path.camera(frame), theta_of_pixels(0.1, LINES));
+            let asked = path.view(frame, theta_of_pixels(0.1, LINES)).expect("a view");
             let report = engine.advance(&[asked]).expect("the store is there");
             engine.mesh_mut().clear_changes();
             if frame >= 60 {
                 times.push(report.select.as_secs_f64() * 1e3);
-                let pixels = 0.1 * asked.k / engine.views()[0].k;
+                let pixels = 0.1 * asked.k() / engine.views()[0].k();
                 (least, most) = (least.min(pixels), most.max(pixels));
                 triangles = (triangles.0.min(report.triangles), triangles.1.max(report.triangles));
             }

@@ -53,7 +53,7 @@ fn main() {
         let options = Options::default();
         for n in 0..FRAMES {
             let frame = (2 * n + 1) * path.frames.len() / (2 * FRAMES);
-            let camera = path.camera(frame);
+            let camera = path.camera(frame).expect("a camera");
             let mesh = subject.frame(&path, frame, &options).expect("nothing can fail in memory");
             let adaptive = reference.deviation(&mesh, &camera, LINES);
             // The coarsest uniform cut that is no worse, to 2 % of its error.

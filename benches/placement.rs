@@ -8,6 +8,8 @@
 //! extent shows as well: what differs there is not owed to the distance. Every frame of every exact strategy is checked. It needs
 //! `shared/data` beside the repository; words select meshes by name.
 
+#![expect(clippy::disallowed_methods, reason = "shapes to measure with")]
+
 use std::fmt::Write as _;
 use std::fs::File;
 use std::io::{self, BufWriter, Write};
@@ -99,7 +101,10 @@ fn compare(
     let mesh = read(file);
     // About the mesh's own origin first.
     let local = Mesh { georeference: Georeference::default(), ..mesh.clone() };
-    let path = placed(&around(&local), &Place { shift: mesh.georeference.origin.into(), ..Place::HOME });
+    let path = placed(
+        &around(&local).expect("a place for a camera"),
+        &Place { shift: mesh.georeference.origin.into(), ..Place::HOME },
+    );
     let log = log_of(mesh);
     let home = all_backends(&log, &path, folder.path());
     println!("| {name} | backend | collapses | triangles | 99 % | largest | |");
@@ -148,7 +153,7 @@ fn all_backends(log: &CollapseLog, path: &Path, folder: &FilePath) -> Vec<Figure
         for n in 0..MEASURED {
             let frame = (2 * n + 1) * path.frames.len() / (2 * MEASURED);
             let shown = subject.frame(path, frame, &options).expect("it was just replayed");
-            let deviation = reference.deviation(&shown, &path.camera(frame), LINES);
+            let deviation = reference.deviation(&shown, &path.camera(frame).expect("a camera"), LINES);
             let (forward, reverse) = (deviation.forward.inner, deviation.reverse.inner);
             p99 = p99.max(forward.p99).max(reverse.p99);
             largest = largest.max(forward.max).max(reverse.max);

@@ -8,6 +8,8 @@
 //!
 //! Every exact strategy must arrive at the same cut in every frame: the benchmark fails where two hashes differ.
 
+#![expect(clippy::disallowed_methods, reason = "shapes to measure with")]
+
 use std::path::PathBuf;
 use std::sync::Arc;
 use std::time::Duration;
@@ -46,7 +48,8 @@ fn main() {
     if is_chosen("million") {
         let scene = Scene::parse("scene:laserscan@2").expect("a scene");
         let log = cached("million", &simplify::Options::default(), || scene.mesh(&mut |_, _| {}));
-        let mut walk = Path { name: "million".to_owned(), ..path::around(&log.mesh) };
+        let mut walk =
+            Path { name: "million".to_owned(), ..path::around(&log.mesh).expect("a place for a camera") };
         walk.frames.truncate(40);
         calm_tables(&arrange(&log), &walk, 0.003);
     }
@@ -55,7 +58,8 @@ fn main() {
         let file = data.join(format!("meshes/{name}.ply"));
         if is_chosen(name) && file.exists() {
             let log = cached(name, &simplify::Options::default(), || read(&[file]));
-            let walk = Path { name: name.to_owned(), ..path::around(&log.mesh) };
+            let walk =
+                Path { name: name.to_owned(), ..path::around(&log.mesh).expect("a place for a camera") };
             calm_tables(&arrange(&log), &walk, 1.0);
         }
     }
@@ -249,7 +253,7 @@ impl Figures {
 fn table(hierarchy: &Arc<Hierarchy>, walk: &Path, declared: &Path, pixels: f64) -> Vec<[Figures; 2]> {
     let theta = theta_of_pixels(pixels, 1080);
     let views: Vec<View> =
-        (0..walk.frames.len()).map(|frame| View::new(&walk.camera(frame), theta)).collect();
+        (0..walk.frames.len()).map(|frame| walk.view(frame, theta).expect("a view")).collect();
     let speed = declared.motion_percentile(99.0);
     let mut least: Vec<[Vec<FrameReport>; 2]> = vec![Default::default(); EXACT.len()];
     let mut hashes: Vec<u64> = Vec::new();

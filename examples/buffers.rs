@@ -102,8 +102,8 @@ pub fn main() -> Result<(), Box<dyn std::error::Error>> {
     let (mut patched, mut whole) = (0, 0);
     for frame in 0..120 {
         let eye = DVec3::new(-1200.0 + 10.0 * f64::from(frame), -800.0, 250.0);
-        let camera = Camera::look_at(eye, DVec3::new(0.0, 0.0, 20.0), DVec3::Z, 1.0, 16.0 / 9.0);
-        engine.advance(&[View::new(&camera, theta_of_pixels(1.0, 1080))])?;
+        let camera = Camera::look_at(eye, DVec3::new(0.0, 0.0, 20.0), DVec3::Z, 1.0, 16.0 / 9.0)?;
+        engine.advance(&[View::new(&camera, theta_of_pixels(1.0, 1080))?])?;
         let before = drawable.vertices.uploaded + drawable.indices.uploaded;
         drawable.patch(engine.mesh_mut());
         let mesh = engine.mesh();

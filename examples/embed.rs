@@ -22,8 +22,8 @@ pub fn main() -> Result<(), Box<dyn std::error::Error>> {
     let mut engine = Engine::new(tree, ActiveMesh::new(), settings)?;
     for frame in 0..240 {
         let eye = DVec3::new(-1200.0 + 5.0 * f64::from(frame), -800.0, 250.0);
-        let camera = Camera::look_at(eye, DVec3::new(0.0, 0.0, 20.0), DVec3::Z, 1.0, 16.0 / 9.0);
-        let report = engine.advance(&[View::new(&camera, theta_of_pixels(1.0, 1080))])?;
+        let camera = Camera::look_at(eye, DVec3::new(0.0, 0.0, 20.0), DVec3::Z, 1.0, 16.0 / 9.0)?;
+        let report = engine.advance(&[View::new(&camera, theta_of_pixels(1.0, 1080))?])?;
         if frame % 60 == 0 {
             println!("frame {frame}: {} triangles, {:?}", report.triangles, report.select);
         }

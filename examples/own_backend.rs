@@ -13,6 +13,8 @@
 //!
 //! `cargo run --release --example own_backend`
 
+#![expect(clippy::disallowed_methods, reason = "a shape to show")]
+
 use foldfront::active_mesh::ActiveMesh;
 use foldfront::engine::{Engine, Settings};
 use foldfront::glam::DVec3;
@@ -168,8 +170,8 @@ pub fn main() -> Result<(), Box<dyn std::error::Error>> {
         let angle = 0.01 * f64::from(frame);
         let height = 0.5 * 0.97_f64.powi(frame);
         let rim = DVec3::new(angle.cos(), angle.sin(), 0.0);
-        let camera = Camera::look_at(rim * (1.0 + height) + DVec3::Z * height, rim, DVec3::Z, 1.0, 1.5);
-        let report = engine.advance(&[View::new(&camera, theta_of_pixels(0.5, 1080))])?;
+        let camera = Camera::look_at(rim * (1.0 + height) + DVec3::Z * height, rim, DVec3::Z, 1.0, 1.5)?;
+        let report = engine.advance(&[View::new(&camera, theta_of_pixels(0.5, 1080))?])?;
         engine.mesh_mut().clear_changes();
         assert_eq!(report.triangles, engine.mesh().displayed() as u64);
         // Every triangle has its share of the disc: together they have the area of the polygon.

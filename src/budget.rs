@@ -84,7 +84,7 @@ impl Steering {
 
     /// Largest change of `k` a frame among these views, while the factor is what it is.
     pub fn kappa(&self, views: &[View]) -> f64 {
-        if self.budget == Budget::None { 0.0 } else { STEP * views.iter().map(|v| v.k).fold(0.0, f64::max) }
+        if self.budget == Budget::None { 0.0 } else { STEP * views.iter().map(View::k).fold(0.0, f64::max) }
     }
 
     /// Whether the budget keeps detail below what the views' own tolerance asks for.

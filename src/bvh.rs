@@ -418,6 +418,7 @@ mod tests {
     /// Ever smaller triangles towards the origin, where each split takes few away: the tree must not get deeper
     /// than the stack of a query.
     #[test]
+    #[expect(clippy::disallowed_methods, reason = "powers of two are exact")]
     fn a_soup_that_shrinks_geometrically_is_searched_through() {
         let mut mesh = Mesh::default();
         for level in 0..2000 {

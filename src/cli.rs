@@ -59,10 +59,15 @@ pub fn main() -> ExitCode {
                 return ExitCode::SUCCESS;
             }
             complain(&failure_line(&error));
-            ExitCode::FAILURE
+            if error.is::<Misunderstood>() { ExitCode::from(2) } else { ExitCode::FAILURE }
         }
     }
 }
+
+/// An argument that is none beside what it is about, such as a tolerance for the lens of a path.
+#[derive(Debug, thiserror::Error)]
+#[error("{0}")]
+struct Misunderstood(String);
 
 /// Says on standard error what went wrong, in one line.
 fn complain(what: &str) {

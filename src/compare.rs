@@ -179,12 +179,12 @@ impl Subject {
     /// The displayed mesh of one frame.
     ///
     /// # Errors
-    /// [`CompareError::Store`], [`CompareError::Tree`].
+    /// [`CompareError::View`], [`CompareError::Store`], [`CompareError::Tree`].
     pub fn frame(&self, path: &Path, frame: usize, options: &Options) -> Result<Mesh, CompareError> {
         let strategy = Strategy::TopDown;
         let Options { criterion, normal_cone, .. } = *options;
         let settings = Settings { strategy, criterion, normal_cone, ..Settings::default() };
-        let view = View::new(&path.camera(frame), options.theta);
+        let view = options.view(path, frame)?;
         with_trees!(self, |open| {
             let opening = Opening { paging: options.paging, ..Opening::SETTLED };
             let mut engine =
@@ -198,13 +198,13 @@ impl Subject {
     /// largest of some frames.
     ///
     /// # Errors
-    /// [`CompareError::Store`], [`CompareError::Tree`].
+    /// [`CompareError::View`], [`CompareError::Store`], [`CompareError::Tree`].
     pub fn needs(&self, path: &Path, frames: &[usize], options: &Options) -> Result<u64, CompareError> {
         let settings =
             Settings { strategy: Strategy::TopDown, criterion: options.criterion, ..Settings::default() };
         let mut most = 0;
         for &frame in frames {
-            let view = View::new(&path.camera(frame), options.theta);
+            let view = options.view(path, frame)?;
             with_trees!(self, |open| {
                 let tree = open(Opening { paging: options.paging, ..Opening::SETTLED })?;
                 let mut engine = Engine::new(tree, NullSink, settings).map_err(|e| self.tree_error(e))?;
@@ -271,7 +271,7 @@ impl Subject {
     /// Replays `frames` of a path with every strategy and every way to prefetch of the options. `progress` counts frames.
     ///
     /// # Errors
-    /// [`CompareError::Store`], [`CompareError::Tree`], and [`CompareError::Wrong`] or [`CompareError::Differs`] where the
+    /// [`CompareError::View`], [`CompareError::Store`], [`CompareError::Tree`], and [`CompareError::Wrong`] or [`CompareError::Differs`] where the
     /// options ask for a check.
     pub fn replay(
         &mut self,
@@ -287,7 +287,7 @@ impl Subject {
         let is_checked = |s: Strategy| options.check || !s.is_exact();
         let speed = options.declared_speed(path);
         let views: Vec<View> =
-            frames.clone().map(|frame| View::new(&path.camera(frame), options.theta)).collect();
+            frames.clone().map(|frame| options.view(path, frame)).collect::<Result<_, _>>()?;
         // Without pages there is nothing to fetch.
         let prefetch =
             if self.backend() == Backend::InMemory { &[Prefetch::None][..] } else { &options.prefetch };

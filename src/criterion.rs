@@ -7,7 +7,7 @@
 //! ```
 //!
 //! For a view with eye `e`, direction `v` and cone half-angle `beta`, and a node with sphere `(c, r)` and error
-//! `eps`, let `D = c - e`, `d = |D|`, `a = D.v`, `p = sqrt(d^2 - a^2)`. Then
+//! `eps`, let `D = c - e`, `d = |D|`, `a = D.v`, `p = |D x v|`. Then
 //!
 //! * inside: `d < r`;
 //! * coarse: `d <= R`, where `R = r + eps k` (screen error: the projection of `eps`, at the sphere's nearest point,
@@ -23,11 +23,37 @@
 //!
 //! The predicate below squares `d <= R` and `f <= r` away: it needs no root, and since IEEE 754 fixes the result of
 //! every operation in it, all strategies, the oracle and every machine agree bit for bit.
+//!
+//! # Rounding
+//!
+//! Let `w = 2^-53`. Every component of `D` is the rounded difference of two numbers that are exact, so `D` is good to
+//! `w d`, and `v` is of length 1 to within `45w`. With that `d^2` is good to `5w d^2`; `a` to `50w d`; a component of
+//! `D x v` loses `w` of each of its two products and of their difference, all three together no more than `3w d`, and
+//! `p` is good to `50w d` however near the axis the centre is. (`sqrt(d^2 - a^2)` is not: there the difference is
+//! rounding, and its root `1e-8 d`.) `b = r + a sin beta` is good to `55w (d + r)`; squares and products with squares of
+//! sine and cosine lose `5w` of what they are. So the predicate decides as an exact one would on lengths that differ
+//! from these by less than `128w (d + r)`, or `128w (d + R)` for coarseness: about `1.5e-14` of them. `q = a cos beta +
+//! p sin beta`, which says whether the apex is nearest, is as good, and where it is 0 both formulas for `f` give `d`, to
+//! within `q^2 / d`. Below `1e-150` squares are lost, and with them lengths.
+//!
+//! The time bounds give up `SLACK (d + r)` or `SLACK (d + R)` and `1e-150`, which is 60,000 times what predicate and
+//! bound lose together: neither is late by rounding.
+//!
+//! Nesting is what rounding might break: a child may be found to be in view that sticks out of its parent by less than
+//! that. Construction leaves `2^-20 r` between the spheres of parents and children, so for `d + R` up to `10^7 r`
+//! and more it can not.
+//!
+//! A [`View`] is finite, with `k` of at least 1, and so are [bounds](Bounds::is_sane): `R` is a number, at least `r`. It
+//! may be infinite, and its square too, with which nothing is done but to compare. All else is finite, as squares of
+//! lengths end at `10^302`.
 
 use vertex_tree::Bounds;
 
 use crate::motion::{Course, Speed};
 use crate::view::View;
+
+/// Half of the relative slack that construction leaves.
+const ROOM: f64 = 1.0 / 2_097_152.0;
 
 /// What "coarse" means: the second half of the refinement criterion.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Default)]
@@ -48,12 +74,13 @@ pub fn is_nested(inner: &Bounds, outer: &Bounds) -> bool {
     }
     let center = |bounds: &Bounds| glam::DVec3::from(bounds.center.map(f64::from));
     let room = f64::from(outer.radius) - f64::from(inner.radius) - center(inner).distance(center(outer));
-    // Half of the relative slack that construction leaves.
-    room >= f64::from(outer.radius) * 2.0_f64.powi(-21) && outer.eps >= inner.eps
+    room >= f64::from(outer.radius) * ROOM && outer.eps >= inner.eps
 }
 
-/// Shares of a numerator that a time bound gives up, so that rounding never makes it late.
+/// Share of the lengths that a time bound gives up, so that rounding never makes it late, the predicate's included.
 const SLACK: f64 = 1e-9;
+/// A length that squaring loses.
+const LOST: f64 = 1e-150;
 
 impl Criterion {
     /// Within which distance of the centre the node is coarse, as `(R, dR/dk)`.
@@ -87,29 +114,32 @@ impl Criterion {
     #[inline(always)]
     #[must_use]
     pub fn unfold_for(self, view: &View, bounds: &Bounds) -> bool {
-        let dx = f64::from(bounds.center[0]) - view.eye.x;
-        let dy = f64::from(bounds.center[1]) - view.eye.y;
-        let dz = f64::from(bounds.center[2]) - view.eye.z;
+        let (eye, v) = (view.eye(), view.direction());
+        let dx = f64::from(bounds.center[0]) - eye.x;
+        let dy = f64::from(bounds.center[1]) - eye.y;
+        let dz = f64::from(bounds.center[2]) - eye.z;
         let r = f64::from(bounds.radius);
         let d2 = dx * dx + dy * dy + dz * dz;
-        let (reach, _) = self.reach(bounds, view.k);
+        let (reach, _) = self.reach(bounds, view.k());
         // R >= r, so a node that is not coarse is not inside either.
-        if d2 > reach * reach {
+        let coarse = d2 <= reach * reach;
+        if !coarse {
             return false;
         }
         if d2 < r * r {
             return true;
         }
-        let a = dx * view.direction.x + dy * view.direction.y + dz * view.direction.z;
-        let p2 = (d2 - a * a).max(0.0);
-        let behind_apex =
-            a < 0.0 && p2 * (view.sin_beta * view.sin_beta) < a * a * (view.cos_beta * view.cos_beta);
+        let a = dx * v.x + dy * v.y + dz * v.z;
+        let (px, py, pz) = (dy * v.z - dz * v.y, dz * v.x - dx * v.z, dx * v.y - dy * v.x);
+        let p2 = px * px + py * py + pz * pz;
+        let (sin, cos) = (view.sin_beta(), view.cos_beta());
+        let behind_apex = a < 0.0 && p2 * (sin * sin) < a * a * (cos * cos);
         if behind_apex {
             return d2 <= r * r;
         }
         // f <= r, with the root on one side: p cos beta <= r + a sin beta.
-        let bound = r + a * view.sin_beta;
-        bound >= 0.0 && p2 * (view.cos_beta * view.cos_beta) <= bound * bound
+        let bound = r + a * sin;
+        bound >= 0.0 && p2 * (cos * cos) <= bound * bound
     }
 
     /// Whether any of the views wants each of two nodes unfolded: what [`unfold`](Self::unfold) says of them, bit for bit,
@@ -126,20 +156,23 @@ impl Criterion {
     #[inline(always)]
     fn unfold_both_for(self, view: &View, bounds: [&Bounds; 2]) -> [bool; 2] {
         let both = |f: &dyn Fn(usize) -> f64| [f(0), f(1)];
-        let [dx, dy, dz] = [view.eye.x, view.eye.y, view.eye.z];
-        let dx = both(&|i| f64::from(bounds[i].center[0]) - dx);
-        let dy = both(&|i| f64::from(bounds[i].center[1]) - dy);
-        let dz = both(&|i| f64::from(bounds[i].center[2]) - dz);
+        let (eye, v) = (view.eye(), view.direction());
+        let dx = both(&|i| f64::from(bounds[i].center[0]) - eye.x);
+        let dy = both(&|i| f64::from(bounds[i].center[1]) - eye.y);
+        let dz = both(&|i| f64::from(bounds[i].center[2]) - eye.z);
         let r = both(&|i| f64::from(bounds[i].radius));
-        let reach = both(&|i| self.reach(bounds[i], view.k).0);
+        let reach = both(&|i| self.reach(bounds[i], view.k()).0);
         let d2 = both(&|i| dx[i] * dx[i] + dy[i] * dy[i] + dz[i] * dz[i]);
         let (reach2, r2) = (both(&|i| reach[i] * reach[i]), both(&|i| r[i] * r[i]));
-        let v = view.direction;
         let a = both(&|i| dx[i] * v.x + dy[i] * v.y + dz[i] * v.z);
         let a2 = both(&|i| a[i] * a[i]);
-        let p2 = both(&|i| (d2[i] - a2[i]).max(0.0));
-        let (sin2, cos2) = (view.sin_beta * view.sin_beta, view.cos_beta * view.cos_beta);
-        let bound = both(&|i| r[i] + a[i] * view.sin_beta);
+        let px = both(&|i| dy[i] * v.z - dz[i] * v.y);
+        let py = both(&|i| dz[i] * v.x - dx[i] * v.z);
+        let pz = both(&|i| dx[i] * v.y - dy[i] * v.x);
+        let p2 = both(&|i| px[i] * px[i] + py[i] * py[i] + pz[i] * pz[i]);
+        let (sin, cos) = (view.sin_beta(), view.cos_beta());
+        let (sin2, cos2) = (sin * sin, cos * cos);
+        let bound = both(&|i| r[i] + a[i] * sin);
         let bound2 = both(&|i| bound[i] * bound[i]);
         let p2_cos2 = both(&|i| p2[i] * cos2);
         [0, 1].map(|i| {
@@ -259,24 +292,21 @@ struct Situation {
 impl Situation {
     #[inline(always)]
     fn new(criterion: Criterion, view: &View, course: &Course, bounds: &Bounds) -> Self {
-        let dx = f64::from(bounds.center[0]) - view.eye.x;
-        let dy = f64::from(bounds.center[1]) - view.eye.y;
-        let dz = f64::from(bounds.center[2]) - view.eye.z;
+        let (eye, v) = (view.eye(), view.direction());
+        let dx = f64::from(bounds.center[0]) - eye.x;
+        let dy = f64::from(bounds.center[1]) - eye.y;
+        let dz = f64::from(bounds.center[2]) - eye.z;
         let r = f64::from(bounds.radius);
-        let d2 = dx * dx + dy * dy + dz * dz;
-        let d = d2.sqrt();
-        let a = dx * view.direction.x + dy * view.direction.y + dz * view.direction.z;
-        let p = (d2 - a * a).max(0.0).sqrt();
-        let f = if a * view.cos_beta + p * view.sin_beta < 0.0 {
-            d
-        } else {
-            p * view.cos_beta - a * view.sin_beta
-        };
-        let (reach, reach_slope) = criterion.reach(bounds, view.k);
+        let d = (dx * dx + dy * dy + dz * dz).sqrt();
+        let a = dx * v.x + dy * v.y + dz * v.z;
+        let (px, py, pz) = (dy * v.z - dz * v.y, dz * v.x - dx * v.z, dx * v.y - dy * v.x);
+        let p = (px * px + py * py + pz * pz).sqrt();
+        let (sin, cos) = (view.sin_beta(), view.cos_beta());
+        let f = if a * cos + p * sin < 0.0 { d } else { p * cos - a * sin };
+        let (reach, reach_slope) = criterion.reach(bounds, view.k());
         let along = dx * course.heading.x + dy * course.heading.y + dz * course.heading.z;
         let ahead = if d > 0.0 { along / d } else { 0.0 };
-        // p near the axis is only good to sqrt(epsilon) d, but there f is far from both marks unless r is larger.
-        let (slack, reach_slack) = (SLACK * (d + r), SLACK * (d + reach));
+        let (slack, reach_slack) = (SLACK * (d + r) + LOST, SLACK * (d + reach) + LOST);
         Self { d, r, ahead, gap: f - r, reach, reach_slope, slack, reach_slack }
     }
 }

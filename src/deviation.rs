@@ -16,7 +16,7 @@
 //! counted apart. Nothing is hidden by anything else: occluded surfaces count like visible ones.
 
 // The measured figures are off the selection path.
-#![allow(clippy::disallowed_methods, reason = "off the selection path")]
+#![expect(clippy::disallowed_methods, reason = "off the selection path")]
 
 mod sample;
 
@@ -126,7 +126,7 @@ impl<'a> Reference<'a> {
     pub fn deviation(&self, displayed: &Mesh, camera: &Camera, lines: u32) -> Deviation {
         let origin = self.mesh.georeference.origin;
         let displayed = &*self.beside(displayed);
-        let view = View::new(&camera.relative_to(origin), lines, NEAR * self.extent);
+        let view = View::new(&camera.about(origin), lines, NEAR * self.extent);
         let seen = view.all_seen(displayed);
         let mut deviation = Deviation {
             lines,
@@ -164,7 +164,7 @@ impl<'a> Reference<'a> {
     /// How many triangles of a mesh have any part in view.
     #[must_use]
     pub fn triangles_in_view(&self, displayed: &Mesh, camera: &Camera) -> usize {
-        let camera = camera.relative_to(self.mesh.georeference.origin);
+        let camera = camera.about(self.mesh.georeference.origin);
         count_in_view(&View::new(&camera, 1, NEAR * self.extent).all_seen(&self.beside(displayed)))
     }
 
@@ -260,8 +260,8 @@ impl View {
     fn new(camera: &Camera, lines: u32, near: f64) -> Self {
         // A single point as original has no extent; any near plane will do for it.
         let near = near.max(f64::MIN_POSITIVE);
-        let pixels_per_angle = 0.5 * f64::from(lines) / (0.5 * camera.fov_y).tan();
-        Self { frustum: Frustum::new(camera, near, 1.0), eye: camera.position, pixels_per_angle, near }
+        let pixels_per_angle = 0.5 * f64::from(lines) / (0.5 * camera.fov_y()).tan();
+        Self { frustum: Frustum::new(camera, near, 1.0), eye: camera.position(), pixels_per_angle, near }
     }
 
     fn seen(&self, corners: [DVec3; 3]) -> Seen {

@@ -59,6 +59,7 @@ fn class(squared: f64) -> usize {
 
 /// The power of two at or below a length, and 1 for 0: between 2^-100 and 2^100, so that its reciprocal is a single-precision
 /// number too.
+#[expect(clippy::disallowed_methods, reason = "powers of two are exact")]
 pub(crate) fn power_of_two(length: f64) -> f64 {
     // Every single-precision number but 0 has an exponent of its own in double precision.
     let exponent = if length > 0.0 { (length.to_bits() >> 52) as i32 - 1023 } else { 0 };

@@ -29,7 +29,7 @@ use crate::motion::{Odometer, Speed};
 use crate::normal_cone::Cones;
 use crate::queue::Kind;
 use crate::refine::{Finder, Flips, Frame, Strategy, Watch, with_strategy};
-use crate::view::View;
+use crate::view::{View, check_origin};
 
 /// How an engine refines.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -41,9 +41,12 @@ pub struct Settings {
     /// Whether a node is only unfolded for views that do not see all below it from behind, where the backend knows
     /// ([`VertexTree::HAS_CONES`]).
     pub normal_cone: bool,
-    /// Declared full speed of the camera, `rho` and `omega`; `kappa` is set by the engine.
+    /// Declared full speed of the eye, in object units a frame. It decides how far ahead the event queue looks, never
+    /// the cut. 0, or what is no number above 0, says that the eye is not expected to move: a frame in which it does
+    /// tests everything that is watched.
     pub rho: f64,
-    /// See [`Speed::omega`].
+    /// Declared full speed of turning, in radians a frame; 0 says that the camera is not expected to turn, as with
+    /// `rho`. (`kappa` is the engine's own, see [`Speed::kappa`].)
     pub omega: f64,
     /// What a frame may cost.
     pub budget: Budget,
@@ -195,8 +198,10 @@ impl<T: VertexTree, M: MeshSink> Engine<T, M> {
     /// Starts with every node folded: the base mesh.
     ///
     /// # Errors
-    /// What the backend reports.
+    /// What the backend reports, and [`TreeError::Origin`].
     pub fn new(mut tree: T, mut mesh: M, settings: Settings) -> Result<Self, TreeError> {
+        let origin = tree.origin();
+        check_origin(origin).map_err(|_| TreeError::Origin { origin })?;
         let front = Front::new(&tree);
         let mut finder = Finder::new(settings.strategy);
         // No views yet: every root is due, whatever the first frame brings.
@@ -212,7 +217,7 @@ impl<T: VertexTree, M: MeshSink> Engine<T, M> {
         }
         tree.base_mesh(&mut mesh)?;
         Ok(Self {
-            origin: tree.origin(),
+            origin,
             tree,
             mesh,
             front,
@@ -318,7 +323,7 @@ impl<T: VertexTree, M: MeshSink> Engine<T, M> {
     /// What the backend reports; the front then is a valid one between the old and the new.
     pub fn advance(&mut self, views: &[View]) -> Result<FrameReport, TreeError> {
         let origin = self.origin;
-        self.follow(views.iter().map(|view| view.relative_to(origin)))
+        self.follow(views.iter().map(|view| view.about(origin)))
     }
 
     /// As [`advance`](Self::advance), to views that are relative to the origin, as [`views`](Self::views) gives them.
@@ -336,7 +341,7 @@ impl<T: VertexTree, M: MeshSink> Engine<T, M> {
         std::mem::swap(&mut self.before, &mut self.views);
         self.views.clear();
         let factor = self.steering.factor;
-        self.views.extend(views.map(|view| view.coarser(factor)));
+        self.views.extend(views.map(|view| view.steered(factor)));
 
         // While a budget steers, `k` has a speed. It is declared anew when the tolerance has moved far from where it
         // was declared; bounds that were computed with another speed do not hold then.
@@ -417,7 +422,11 @@ impl<T: VertexTree, M: MeshSink> Engine<T, M> {
             _ => Limit::Error,
         };
         let moved = self.before.len() != self.views.len()
-            || self.before.iter().zip(&self.views).any(|(b, v)| b.eye != v.eye || b.direction != v.direction);
+            || self
+                .before
+                .iter()
+                .zip(&self.views)
+                .any(|(b, v)| b.eye() != v.eye() || b.direction() != v.direction());
         self.steering.observe(triangles, select + std::mem::take(&mut self.drawing_time), moved);
         Ok(FrameReport {
             select,

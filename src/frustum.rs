@@ -1,7 +1,7 @@
 //! The viewing frustum as planes, and triangles clipped to it (Sutherland & Hodgman 1974).
 
 // The measured figures and the pictures are off the selection path.
-#![allow(clippy::disallowed_methods, reason = "off the selection path")]
+#![expect(clippy::disallowed_methods, reason = "off the selection path")]
 
 use glam::DVec3;
 
@@ -70,8 +70,8 @@ impl Frustum {
     /// What `camera` sees further ahead than `near`, in object units, with the image enlarged `widen` times.
     pub(crate) fn new(camera: &Camera, near: f64, widen: f64) -> Self {
         let (ahead, right, up) = (camera.direction(), camera.right(), camera.up());
-        let half_height = (0.5 * camera.fov_y).tan() * widen;
-        let half_width = half_height * camera.aspect;
+        let half_height = (0.5 * camera.fov_y()).tan() * widen;
+        let half_width = half_height * camera.aspect();
         let normals = [
             ahead,
             ahead * half_width + right,
@@ -79,7 +79,7 @@ impl Frustum {
             ahead * half_height + up,
             ahead * half_height - up,
         ];
-        Self { eye: camera.position, near, normals }
+        Self { eye: camera.position(), near, normals }
     }
 
     /// Signed distances from the planes, in the units of each plane's normal; inside, all are at least 0.
@@ -134,12 +134,8 @@ mod tests {
 
     /// Looks along -z from the origin, 90 degrees high and wide.
     fn frustum() -> Frustum {
-        let camera = Camera {
-            position: DVec3::ZERO,
-            orientation: DQuat::IDENTITY,
-            fov_y: std::f64::consts::FRAC_PI_2,
-            aspect: 1.0,
-        };
+        let right_angle = std::f64::consts::FRAC_PI_2;
+        let camera = Camera::new(DVec3::ZERO, DQuat::IDENTITY, right_angle, 1.0).unwrap();
         Frustum::new(&camera, 0.5, 1.0)
     }
 

@@ -41,8 +41,8 @@
 //! // Every frame: say where the camera is, upload what changed, draw.
 //! for frame in 0..60 {
 //!     let eye = DVec3::new(0.02 * f64::from(frame), -2.0, 1.0);
-//!     let camera = Camera::look_at(eye, DVec3::ZERO, DVec3::Z, 1.0, 16.0 / 9.0);
-//!     let report = engine.advance(&[View::new(&camera, theta_of_pixels(1.0, 1080))])?;
+//!     let camera = Camera::look_at(eye, DVec3::ZERO, DVec3::Z, 1.0, 16.0 / 9.0)?;
+//!     let report = engine.advance(&[View::new(&camera, theta_of_pixels(1.0, 1080))?])?;
 //!     let buffers = engine.mesh_mut();
 //!     for &slot in buffers.changed_triangles() {
 //!         // Upload `buffers.triangles()[slot]`, unless the slot is not used any more.

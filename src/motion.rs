@@ -8,9 +8,10 @@ use crate::view::View;
 /// whether the cut is right: a camera that exceeds them makes the clock run faster.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Speed {
-    /// Distance the eye moves in a frame at full speed, in object units.
+    /// Distance the eye moves in a frame at full speed, in object units. Where it is 0, or no number above 0, no motion
+    /// is covered.
     pub rho: f64,
-    /// Angle the direction turns in a frame at full speed, in radians.
+    /// Angle the direction turns in a frame at full speed, in radians; 0 as for `rho`.
     pub omega: f64,
     /// Change of [`View::k`] in a frame at full speed; 0 where the tolerance is fixed.
     pub kappa: f64,
@@ -56,14 +57,34 @@ impl Course {
     /// by no more than `stray`.
     fn frames_to_move(&self, moved: DVec3) -> f64 {
         let forward = moved.dot(self.heading);
-        let frames = |amount: f64, rate: f64| if amount > 0.0 { amount / rate } else { 0.0 };
         if forward > 0.0 && self.rho > 0.0 {
-            let astray = (moved - forward * self.heading).length();
-            frames(forward, self.rho).max(frames(astray, self.stray))
+            let astray = moved - forward * self.heading;
+            later(frames_for(forward, self.rho), frames_for(length(astray), self.stray))
         } else {
-            frames(moved.length(), self.stray)
+            frames_for(length(moved), self.stray)
         }
     }
+}
+
+/// Frames that an amount takes at a rate; infinite where there is an amount and no rate. What is not a number is not
+/// nothing: a camera that can not be compared has not been at rest.
+fn frames_for(amount: f64, rate: f64) -> f64 {
+    match amount {
+        0.0 => 0.0,
+        _ if rate > 0.0 => amount / rate,
+        _ => f64::INFINITY,
+    }
+}
+
+/// The larger of two; what is not a number is larger than all that is.
+fn later(a: f64, b: f64) -> f64 {
+    if b > a || b.is_nan() { b } else { a }
+}
+
+/// The length of a vector, or more where its squares are lost.
+fn length(v: DVec3) -> f64 {
+    let length = v.length();
+    if length < 1e-150 { 2.0 * v.abs().max_element() } else { length }
 }
 
 /// What happened to the views between two frames.
@@ -144,25 +165,29 @@ impl<'a> Travel<'a> {
         let mut travel = Self { before, after, turned: 0.0, steered: 0.0, is_rest: before == after };
         for (b, a) in before.iter().zip(after) {
             // acos of a dot product is 0 for slow pans, and the clock would stand still.
-            let turned =
-                2.0 * (a.direction - b.direction).length().atan2((a.direction + b.direction).length());
+            let chord = length(a.direction() - b.direction());
+            let turned = 2.0 * libm::atan2(chord, (a.direction() + b.direction()).length());
+            let steered = (a.k() - b.k()).abs();
+            // Below, and wherever a largest is looked for, what is not a number would be passed over.
+            let compared = (a.eye() - b.eye()) + (a.direction() - b.direction());
+            if !(compared.is_finite() && turned.is_finite() && steered.is_finite()) {
+                return None;
+            }
             travel.turned = travel.turned.max(turned);
-            travel.steered = travel.steered.max((a.k - b.k).abs());
+            travel.steered = travel.steered.max(steered);
         }
         Some(travel)
     }
 
     /// How each eye has moved.
     pub fn moves(&self) -> impl Iterator<Item = DVec3> + '_ {
-        self.before.iter().zip(self.after).map(|(b, a)| a.eye - b.eye)
+        self.before.iter().zip(self.after).map(|(b, a)| a.eye() - b.eye())
     }
 
     fn on_course(&self, course: &Course) -> Motion {
-        let mut frames = self.moves().map(|moved| course.frames_to_move(moved)).fold(0.0, f64::max);
+        let mut frames = self.moves().map(|moved| course.frames_to_move(moved)).fold(0.0, later);
         for (amount, rate) in [(self.turned, course.omega), (self.steered, course.kappa)] {
-            if amount > 0.0 {
-                frames = frames.max(amount / rate);
-            }
+            frames = later(frames, frames_for(amount, rate));
         }
         if frames == 0.0 && self.is_rest {
             Motion::Rest
@@ -171,6 +196,70 @@ impl<'a> Travel<'a> {
             Motion::Frames((frames * ROUND_UP).max(f64::MIN_POSITIVE))
         } else {
             Motion::Unbounded
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn view(x: f64) -> View {
+        View::from_parts(DVec3::new(x, 0.0, 0.0), DVec3::Z, 0.8, 0.6, 10.0).unwrap()
+    }
+
+    const FULL: Speed = Speed { rho: 0.5, omega: 0.1, kappa: 1.0 };
+
+    #[test]
+    fn what_is_no_number_is_no_rest() {
+        let right = view(1.0);
+        for nan in [f64::NAN, f64::INFINITY, f64::NEG_INFINITY] {
+            let (eye, direction) = (right.eye(), right.direction());
+            for wrong in [
+                View::unchecked(DVec3::new(0.0, nan, 0.0), direction, 0.8, 0.6, 10.0),
+                View::unchecked(eye, DVec3::new(nan, 0.0, 1.0), 0.8, 0.6, 10.0),
+                View::unchecked(eye, direction, nan, 0.6, 10.0),
+                View::unchecked(eye, direction, 0.8, 0.6, nan),
+            ] {
+                for views in [[[right], [wrong]], [[wrong], [right]], [[wrong], [wrong]]] {
+                    let mut clock = Odometer::default();
+                    let motion = clock.advance(&FULL.into(), &views[0], &views[1]);
+                    // A cone of infinity is the same as before.
+                    let is_same = views[0] == views[1] && wrong.cos_beta().is_infinite();
+                    assert_eq!(motion, if is_same { Motion::Rest } else { Motion::Unbounded }, "{views:?}");
+                }
+            }
+        }
+    }
+
+    #[test]
+    fn a_motion_at_no_speed_is_not_covered() {
+        let turned = view(1.0).with_direction(DVec3::new(0.6, 0.0, 0.8)).unwrap();
+        let steered = view(1.0).with_k(11.0).unwrap();
+        for none in [0.0, -0.0, -1.0, f64::NAN] {
+            for (speed, after) in [
+                (Speed { rho: none, ..FULL }, view(1.0 + 1e-9)),
+                (Speed { omega: none, ..FULL }, turned),
+                (Speed { kappa: none, ..FULL }, steered),
+            ] {
+                let motion = |after| Odometer::default().advance(&speed.into(), &[view(1.0)], &[after]);
+                assert_eq!(motion(after), Motion::Unbounded, "{speed:?}");
+                assert_eq!(motion(view(1.0)), Motion::Rest, "{speed:?}");
+            }
+            let course = Course { heading: DVec3::X, rho: 1.0, stray: none, omega: 1.0, kappa: 1.0 };
+            let motion = |x| Odometer::default().advance(&course, &[view(1.0)], &[view(x)]);
+            assert!(matches!(motion(1.5), Motion::Frames(_)), "straight on");
+            assert_eq!(motion(0.5), Motion::Unbounded, "back");
+        }
+    }
+
+    /// Squares of these are lost.
+    #[test]
+    fn the_smallest_motion_is_measured() {
+        for step in [1e-170, 1e-200, 5e-324] {
+            let slow = Speed { rho: step, ..FULL };
+            let motion = Odometer::default().advance(&slow.into(), &[view(0.0)], &[view(step)]);
+            assert!(matches!(motion, Motion::Frames(frames) if frames >= 1.0), "{step}: {motion:?}");
         }
     }
 }

@@ -39,8 +39,10 @@ use crate::front::Slot;
 use crate::motion::Course;
 use crate::view::View;
 
-/// Share of the lengths that a time bound gives up, so that rounding never makes it late.
+/// Share of the lengths that a time bound gives up, so that rounding never makes it late, the predicate's included.
 const SLACK: f64 = 1e-9;
+/// A length that squaring loses.
+const LOST: f64 = 1e-150;
 
 /// Axis, cosine and sine; `None` for a cone that says nothing.
 #[inline]
@@ -73,13 +75,13 @@ pub fn signed_distance(eye: DVec3, bounds: &Bounds, cone: &NormalCone) -> Option
     let (q, h) = (from.dot(axis), from.cross(axis).length());
     // Within the cone: cos(phi) >= cos(alpha).
     let nearest = if q >= d * cosine { d } else { q * cosine + h * sine };
-    Some((r + nearest, SLACK * (d + r)))
+    Some((r + nearest, SLACK * (d + r) + LOST))
 }
 
 /// Whether any of the views wants the node unfolded that is not behind it.
 #[must_use]
 pub fn unfold(criterion: Criterion, views: &[View], bounds: &Bounds, cone: &NormalCone) -> bool {
-    views.iter().any(|view| criterion.unfold_for(view, bounds) && !is_back_facing(view.eye, bounds, cone))
+    views.iter().any(|view| criterion.unfold_for(view, bounds) && !is_back_facing(view.eye(), bounds, cone))
 }
 
 /// [`Criterion::earliest_unfold`] with the normal-cone test.
@@ -93,7 +95,7 @@ pub fn earliest_unfold(
 ) -> f64 {
     let earliest = |view: &View| {
         let wanted = criterion.earliest_unfold(std::slice::from_ref(view), course, bounds);
-        match signed_distance(view.eye, bounds, cone) {
+        match signed_distance(view.eye(), bounds, cone) {
             Some((g, slack)) => wanted.max(course.frames(-g - slack, course.rho + course.stray)),
             None => wanted,
         }
@@ -112,7 +114,7 @@ pub fn earliest_fold(
 ) -> f64 {
     let earliest = |view: &View| {
         let unwanted = criterion.earliest_fold(std::slice::from_ref(view), course, bounds);
-        match signed_distance(view.eye, bounds, cone) {
+        match signed_distance(view.eye(), bounds, cone) {
             Some((g, slack)) => unwanted.min(course.frames(g - slack, course.rho + course.stray)),
             None => unwanted,
         }

@@ -20,7 +20,7 @@ use glam::{DMat3, DQuat, DVec3};
 use vertex_tree::{MeshSink, PageStats, TreeError, VertexTree};
 
 use crate::engine::{Engine, FrameReport, Limit, Settings};
-use crate::view::View;
+use crate::view::{View, ViewError};
 
 pub use scene_file::{SceneFileError, read_scene};
 #[cfg(feature = "mt-partition")]
@@ -66,6 +66,28 @@ pub enum PlacementError {
     },
 }
 
+/// A scene can not go on.
+#[derive(Debug, thiserror::Error)]
+#[non_exhaustive]
+pub enum ObjectsError {
+    /// The backend of an object can not.
+    #[error("object {object}: {source}")]
+    Tree {
+        /// Its number, from 0.
+        object: usize,
+        /// Why.
+        source: TreeError,
+    },
+    /// A view of the scene is none of an object.
+    #[error("object {object}: {source}")]
+    View {
+        /// Its number, from 0.
+        object: usize,
+        /// What is wrong with the view.
+        source: ViewError,
+    },
+}
+
 /// What a matrix written as text may be away from a rotation.
 const TOLERANCE: f64 = 1e-4;
 
@@ -85,13 +107,13 @@ impl Placement {
         let linear = DMat3::from_cols(column(0), column(1), column(2));
         let determinant = linear.determinant();
         let size = linear.to_cols_array().iter().fold(0.0_f64, |size, x| size.max(x.abs()));
-        if determinant.abs() <= size.powi(3) * TOLERANCE {
+        if determinant.abs() <= size * size * size * TOLERANCE {
             return Err(PlacementError::Flat { determinant });
         }
         if determinant < 0.0 {
             return Err(PlacementError::Mirrored { determinant });
         }
-        let scale = determinant.cbrt();
+        let scale = libm::cbrt(determinant);
         let turned = linear * (1.0 / scale);
         let off = turned.transpose() * turned - DMat3::IDENTITY;
         let by = off.to_cols_array().iter().fold(0.0_f64, |by, x| by.max(x.abs()));
@@ -108,14 +130,13 @@ impl Placement {
     }
 
     /// A view of the scene as a view of the object.
-    #[must_use]
-    pub fn view(&self, view: &View) -> View {
+    ///
+    /// # Errors
+    /// Where the eye comes to lie out of range, or the placement is none.
+    pub fn view(&self, view: &View) -> Result<View, ViewError> {
         let back = self.rotation.conjugate();
-        View {
-            eye: back * (view.eye - self.translation) / self.scale,
-            direction: (back * view.direction).normalize(),
-            ..*view
-        }
+        view.with_eye(back * (view.eye() - self.translation) / self.scale)?
+            .with_direction((back * view.direction()).normalize())
     }
 }
 
@@ -140,6 +161,20 @@ impl<T: VertexTree, M: MeshSink> Object<T, M> {
     pub fn engine_mut(&mut self) -> &mut Engine<T, M> {
         &mut self.engine
     }
+
+    /// Moves it, which is the object of this number, to these views of the scene; `own` is room for its own.
+    fn advance(
+        &mut self,
+        object: usize,
+        views: &[View],
+        own: &mut Vec<View>,
+    ) -> Result<FrameReport, ObjectsError> {
+        own.clear();
+        for view in views {
+            own.push(self.placement.view(view).map_err(|source| ObjectsError::View { object, source })?);
+        }
+        self.engine.advance(own).map_err(|source| ObjectsError::Tree { object, source })
+    }
 }
 
 /// The objects of a scene.
@@ -157,12 +192,15 @@ impl<T: VertexTree, M: MeshSink> Objects<T, M> {
     pub fn new(
         parts: impl IntoIterator<Item = (T, M, Placement)>,
         settings: Settings,
-    ) -> Result<Self, TreeError> {
-        let object = |(tree, mesh, placement): (T, M, Placement)| {
+    ) -> Result<Self, ObjectsError> {
+        let object = |(number, (tree, mesh, placement)): (usize, (T, M, Placement))| {
             let settings = Settings { rho: settings.rho / placement.scale, ..settings };
-            Ok(Object { placement, engine: Engine::new(tree, mesh, settings)? })
+            let engine = Engine::new(tree, mesh, settings);
+            let engine = engine.map_err(|source| ObjectsError::Tree { object: number, source })?;
+            Ok(Object { placement, engine })
         };
-        Ok(Self { objects: parts.into_iter().map(object).collect::<Result<_, _>>()?, views: Vec::new() })
+        let objects = parts.into_iter().enumerate().map(object).collect::<Result<_, _>>()?;
+        Ok(Self { objects, views: Vec::new() })
     }
 
     /// The objects, in order.
@@ -179,8 +217,8 @@ impl<T: VertexTree, M: MeshSink> Objects<T, M> {
     /// together.
     ///
     /// # Errors
-    /// The first that a backend reports. The other objects have been moved all the same.
-    pub fn advance(&mut self, views: &[View]) -> Result<FrameReport, TreeError> {
+    /// The first of an object. The others have been moved all the same.
+    pub fn advance(&mut self, views: &[View]) -> Result<FrameReport, ObjectsError> {
         let mut all = FrameReport {
             select: Duration::ZERO,
             apply: Duration::ZERO,
@@ -199,11 +237,9 @@ impl<T: VertexTree, M: MeshSink> Objects<T, M> {
             pages: PageStats::default(),
         };
         let mut failure = None;
-        for (number, object) in (0_u64..).zip(&mut self.objects) {
-            self.views.clear();
-            self.views.extend(views.iter().map(|view| object.placement.view(view)));
-            match object.engine.advance(&self.views) {
-                Ok(report) => add(&mut all, &report, number),
+        for (number, object) in self.objects.iter_mut().enumerate() {
+            match object.advance(number, views, &mut self.views) {
+                Ok(report) => add(&mut all, &report, number as u64),
                 Err(error) => failure = failure.or(Some(error)),
             }
         }
@@ -214,16 +250,23 @@ impl<T: VertexTree, M: MeshSink> Objects<T, M> {
     ///
     /// # Errors
     /// The first that a backend reports.
-    pub fn pass(&mut self, time: Duration) -> Result<(), TreeError> {
-        self.objects.iter_mut().try_for_each(|object| object.engine.tree_mut().pass(time))
+    pub fn pass(&mut self, time: Duration) -> Result<(), ObjectsError> {
+        self.for_each_tree(|tree| tree.pass(time))
     }
 
     /// Waits until every page that has been asked for has arrived or failed.
     ///
     /// # Errors
     /// The first that a backend reports.
-    pub fn settle(&mut self) -> Result<(), TreeError> {
-        self.objects.iter_mut().try_for_each(|object| object.engine.tree_mut().settle())
+    pub fn settle(&mut self) -> Result<(), ObjectsError> {
+        self.for_each_tree(T::settle)
+    }
+
+    fn for_each_tree(&mut self, f: impl Fn(&mut T) -> Result<(), TreeError>) -> Result<(), ObjectsError> {
+        let f = |(object, it): (usize, &mut Object<T, M>)| {
+            f(it.engine.tree_mut()).map_err(|source| ObjectsError::Tree { object, source })
+        };
+        self.objects.iter_mut().enumerate().try_for_each(f)
     }
 }
 

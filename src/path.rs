@@ -15,15 +15,16 @@ mod text;
 
 use glam::{DQuat, DVec3};
 
+pub(crate) use around::FOV_Y;
 pub use around::around;
 pub use format::PathError;
 pub use generate::{generate, recorded};
 pub use summary::{Motion, Summary};
 
-use crate::view::Camera;
+use crate::view::{Camera, View, ViewError};
 
 /// A recorded walkthrough. What [`Path::read`] returns has at least one frame, strictly increasing finite times, and
-/// unit quaternions.
+/// cameras that are right.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Path {
     /// Name for tables and file names.
@@ -49,15 +50,37 @@ pub struct Pose {
     pub orientation: DQuat,
 }
 
+impl Pose {
+    /// Unit vector of the viewing direction.
+    #[must_use]
+    pub fn direction(&self) -> DVec3 {
+        (self.orientation * DVec3::NEG_Z).normalize()
+    }
+}
+
 impl Path {
     /// The camera at a frame.
+    ///
+    /// # Errors
+    /// What is wrong with it; nothing is in a path that was read, imported or generated.
     ///
     /// # Panics
     ///
     /// If there is no such frame.
-    #[must_use]
-    pub fn camera(&self, frame: usize) -> Camera {
+    pub fn camera(&self, frame: usize) -> Result<Camera, ViewError> {
         let Pose { position, orientation, .. } = self.frames[frame];
-        Camera { position, orientation, fov_y: self.fov_y, aspect: self.aspect }
+        Camera::new(position, orientation, self.fov_y, self.aspect)
+    }
+
+    /// What selection needs of the camera at a frame, with tolerance `theta`.
+    ///
+    /// # Errors
+    /// Those of [`camera`](Self::camera) and of [`View::new`].
+    ///
+    /// # Panics
+    ///
+    /// If there is no such frame.
+    pub fn view(&self, frame: usize, theta: f64) -> Result<View, ViewError> {
+        View::new(&self.camera(frame)?, theta)
     }
 }

@@ -4,7 +4,7 @@
 //! to the viewer's sans-serif font.
 
 // Plots are off the selection path.
-#![allow(clippy::disallowed_methods, reason = "off the selection path")]
+#![expect(clippy::disallowed_methods, reason = "off the selection path")]
 
 mod axis;
 mod frame;

@@ -7,7 +7,7 @@
 //! same picture, whatever the number of threads.
 
 // Pictures are off the selection path.
-#![allow(clippy::disallowed_methods, reason = "off the selection path")]
+#![expect(clippy::disallowed_methods, reason = "off the selection path")]
 
 mod image;
 mod outside;
@@ -81,7 +81,7 @@ pub enum Shading {
 /// Draws what `camera` sees of `mesh`.
 #[must_use]
 pub fn render(mesh: &Mesh, camera: &Camera, style: &Style) -> Image {
-    let camera = camera.relative_to(mesh.georeference.origin);
+    let camera = camera.about(mesh.georeference.origin);
     let projection = Projection::new(&camera, style, NEAR * mesh.extent());
     let facets = facets(mesh, &projection, style, |_| IN_VIEW);
     Scene { facets, veils: Vec::new(), lines: Vec::new(), wires: style.wires }.draw(&projection)
@@ -92,8 +92,8 @@ pub fn render(mesh: &Mesh, camera: &Camera, style: &Style) -> Image {
 #[must_use]
 pub fn render_outside(mesh: &Mesh, view: &Camera, style: &Style) -> Image {
     let bounds = mesh.bounding_box().unwrap_or_default();
-    let view = &view.relative_to(mesh.georeference.origin);
-    let camera = outside_camera(view, bounds);
+    let view = &view.about(mesh.georeference.origin);
+    let camera = outside::outside(view, bounds);
     let near = NEAR * mesh.extent();
     let projection = Projection::new(&camera, style, near);
     let in_view = Frustum::new(view, near, 1.0);

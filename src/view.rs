@@ -1,55 +1,23 @@
 //! The camera, and what selection needs of it.
+//!
+//! Cameras and views are right by construction: whatever makes one checks it, and the error names the value that is
+//! wrong. So nothing behind this module meets an eye or a tolerance that is not a number, for which every comparison
+//! is false and a camera would seem to be at rest.
 
-use glam::{DMat3, DQuat, DVec3};
+mod camera;
+mod checks;
+#[cfg(test)]
+mod tests;
 
-/// A perspective camera: as recorded in a path, and as a renderer has it.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Camera {
-    /// Eye position, in world coordinates.
-    pub position: DVec3,
-    /// Rotation from camera space to the world. The camera looks along its -z with y up. A unit quaternion.
-    pub orientation: DQuat,
-    /// Full vertical field of view, in radians, above 0 and below pi.
-    pub fov_y: f64,
-    /// Width over height of the image.
-    pub aspect: f64,
-}
+use glam::DVec3;
 
-impl Camera {
-    /// A camera at `position` that looks at `target` with `up` upwards in the image, as far as that can be. `target`
-    /// must be elsewhere.
-    #[must_use]
-    pub fn look_at(position: DVec3, target: DVec3, up: DVec3, fov_y: f64, aspect: f64) -> Self {
-        let back = (position - target).normalize();
-        let right = up.cross(back).try_normalize().unwrap_or_else(|| back.any_orthonormal_vector());
-        let orientation = DQuat::from_mat3(&DMat3::from_cols(right, back.cross(right), back)).normalize();
-        Self { position, orientation, fov_y, aspect }
-    }
+pub use camera::Camera;
+pub use checks::ViewError;
+pub(crate) use checks::{check_aspect, check_eye, check_fov, check_orientation, check_origin};
+use checks::{check_cone, check_k, unit};
 
-    /// The same camera in coordinates about `origin`, in which a mesh has its positions.
-    #[must_use]
-    pub fn relative_to(&self, origin: [f64; 3]) -> Self {
-        Self { position: self.position - DVec3::from(origin), ..*self }
-    }
-
-    /// Unit vector of the viewing direction.
-    #[must_use]
-    pub fn direction(&self) -> DVec3 {
-        (self.orientation * DVec3::NEG_Z).normalize()
-    }
-
-    /// Unit vector to the right of the image.
-    #[must_use]
-    pub fn right(&self) -> DVec3 {
-        (self.orientation * DVec3::X).normalize()
-    }
-
-    /// Unit vector to the top of the image.
-    #[must_use]
-    pub fn up(&self) -> DVec3 {
-        (self.orientation * DVec3::Y).normalize()
-    }
-}
+/// Beyond this, the square root of 1 + x^2 is x.
+const STEEP: f64 = 1e9;
 
 /// The tolerance `theta` that `pixels` on an image of `lines` lines mean: a length's share of half the image's
 /// height.
@@ -66,54 +34,175 @@ pub fn theta_of_pixels(pixels: f64, lines: u32) -> f64 {
 /// `sqrt(2) fov / 2`, which is less than that for wide images.)
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct View {
-    /// Eye position: in world coordinates for an engine, in those of the spheres for the criterion.
-    pub eye: DVec3,
-    /// Unit vector of the viewing direction.
-    pub direction: DVec3,
-    /// Cosine of the cone's half-angle.
-    pub cos_beta: f64,
-    /// Sine of the cone's half-angle.
-    pub sin_beta: f64,
-    /// `1 / (tan(fov_y / 2) theta)`, at least 1: how many times its own size away a length may be before it falls
-    /// below the tolerance.
-    pub k: f64,
+    eye: DVec3,
+    direction: DVec3,
+    cos_beta: f64,
+    sin_beta: f64,
+    k: f64,
 }
 
 impl View {
+    /// The largest that a coordinate of an eye or of an origin may be. Squares of distances do not overflow then, and
+    /// the spheres of nodes end at 3.4e38.
+    pub const FARTHEST: f64 = checks::FARTHEST;
+
     /// The view of `camera` with tolerance `theta` (see [`theta_of_pixels`]).
     ///
     /// `k` is kept at 1 or above: a tolerance of the whole half-image and more makes no difference any more.
-    #[must_use]
-    pub fn new(camera: &Camera, theta: f64) -> Self {
-        let tan_half_fov = (camera.fov_y / 2.0).tan();
-        let tan_beta = tan_half_fov * (1.0 + camera.aspect * camera.aspect).sqrt();
-        let secant = (1.0 + tan_beta * tan_beta).sqrt();
-        Self {
-            eye: camera.position,
-            direction: camera.direction(),
-            cos_beta: 1.0 / secant,
-            sin_beta: tan_beta / secant,
-            k: (1.0 / (tan_half_fov * theta)).max(1.0),
+    ///
+    /// # Errors
+    /// [`ViewError::Tolerance`], and [`ViewError::TooFine`] where `1 / (tan(fov_y / 2) theta)` is not finite.
+    pub fn new(camera: &Camera, theta: f64) -> Result<Self, ViewError> {
+        if !(theta > 0.0 && theta.is_finite()) {
+            return Err(ViewError::Tolerance { theta });
         }
+        let tan_half_fov = libm::tan(check_fov(camera.fov_y())? / 2.0);
+        let aspect = check_aspect(camera.aspect())?;
+        // Neither square overflows: beyond, the 1 is lost anyway.
+        let diagonal = if aspect > STEEP { aspect } else { (1.0 + aspect * aspect).sqrt() };
+        let tan_beta = tan_half_fov * diagonal;
+        let (cos_beta, sin_beta) = if tan_beta > STEEP {
+            (1.0 / tan_beta, 1.0)
+        } else {
+            let secant = (1.0 + tan_beta * tan_beta).sqrt();
+            (1.0 / secant, tan_beta / secant)
+        };
+        let k = 1.0 / (tan_half_fov * theta);
+        if !k.is_finite() {
+            return Err(ViewError::TooFine { theta, fov_y: camera.fov_y() });
+        }
+        Self::from_parts(camera.position(), camera.direction(), cos_beta, sin_beta, k.max(1.0))
+    }
+
+    /// The view from `eye` along `direction`, of length 1, through a cone of half-angle `beta` from 0 to 90 degrees, at
+    /// a `k` that is finite and at least 1; see the methods of these names.
+    ///
+    /// A direction whose length is within a millionth of 1 is normalised, and kept to the bit where it has been before.
+    ///
+    /// # Errors
+    /// [`ViewError`], which names what is wrong.
+    pub fn from_parts(
+        eye: DVec3,
+        direction: DVec3,
+        cos_beta: f64,
+        sin_beta: f64,
+        k: f64,
+    ) -> Result<Self, ViewError> {
+        check_cone(cos_beta, sin_beta)?;
+        Ok(Self { eye: check_eye(eye)?, direction: unit(direction)?, cos_beta, sin_beta, k: check_k(k)? })
+    }
+
+    /// Eye position: in world coordinates for an engine, in those of the spheres for the criterion.
+    #[inline(always)]
+    #[must_use]
+    pub fn eye(&self) -> DVec3 {
+        self.eye
+    }
+
+    /// Unit vector of the viewing direction.
+    #[inline(always)]
+    #[must_use]
+    pub fn direction(&self) -> DVec3 {
+        self.direction
+    }
+
+    /// Cosine of the cone's half-angle.
+    #[inline(always)]
+    #[must_use]
+    pub fn cos_beta(&self) -> f64 {
+        self.cos_beta
+    }
+
+    /// Sine of the cone's half-angle.
+    #[inline(always)]
+    #[must_use]
+    pub fn sin_beta(&self) -> f64 {
+        self.sin_beta
+    }
+
+    /// `1 / (tan(fov_y / 2) theta)`, at least 1 and finite: how many times its own size away a length may be before it
+    /// falls below the tolerance.
+    #[inline(always)]
+    #[must_use]
+    pub fn k(&self) -> f64 {
+        self.k
+    }
+
+    /// The same view from elsewhere.
+    ///
+    /// # Errors
+    /// [`ViewError::Eye`].
+    pub fn with_eye(self, eye: DVec3) -> Result<Self, ViewError> {
+        Ok(Self { eye: check_eye(eye)?, ..self })
+    }
+
+    /// The same view in another direction.
+    ///
+    /// # Errors
+    /// [`ViewError::Direction`].
+    pub fn with_direction(self, direction: DVec3) -> Result<Self, ViewError> {
+        Ok(Self { direction: unit(direction)?, ..self })
+    }
+
+    /// The same view through another cone.
+    ///
+    /// # Errors
+    /// [`ViewError::Cone`].
+    pub fn with_cone(self, cos_beta: f64, sin_beta: f64) -> Result<Self, ViewError> {
+        check_cone(cos_beta, sin_beta)?;
+        Ok(Self { cos_beta, sin_beta, ..self })
+    }
+
+    /// The same view with another [`k`](Self::k).
+    ///
+    /// # Errors
+    /// [`ViewError::Scale`].
+    pub fn with_k(self, k: f64) -> Result<Self, ViewError> {
+        Ok(Self { k: check_k(k)?, ..self })
     }
 
     /// The same view in coordinates about `origin`, in which a tree has its spheres.
-    #[must_use]
-    pub fn relative_to(mut self, origin: [f64; 3]) -> Self {
-        self.eye -= DVec3::from(origin);
-        self
+    ///
+    /// # Errors
+    /// [`ViewError::Origin`], and [`ViewError::Eye`] where the difference is out of range.
+    pub fn relative_to(self, origin: [f64; 3]) -> Result<Self, ViewError> {
+        self.with_eye(self.eye - DVec3::from(check_origin(origin)?))
     }
 
-    /// The same view with its tolerance multiplied by `factor`.
-    #[must_use]
-    pub fn coarser(mut self, factor: f64) -> Self {
-        self.k = (self.k / factor).max(1.0);
-        self
+    /// [`relative_to`](Self::relative_to) an origin that has been [checked](check_origin): a coordinate of the eye is at
+    /// most `2 FARTHEST`, whose square is as finite as that of `FARTHEST`.
+    #[inline]
+    pub(crate) fn about(self, origin: [f64; 3]) -> Self {
+        Self { eye: self.eye - DVec3::from(origin), ..self }
+    }
+
+    /// The same view with its tolerance multiplied by `factor`. `k` is kept at 1 or above, and finite.
+    ///
+    /// # Errors
+    /// [`ViewError::Factor`] unless the factor is finite and above 0.
+    pub fn coarser(self, factor: f64) -> Result<Self, ViewError> {
+        if factor > 0.0 && factor.is_finite() {
+            Ok(self.steered(factor))
+        } else {
+            Err(ViewError::Factor { factor })
+        }
+    }
+
+    /// [`coarser`](Self::coarser) by a factor that is finite and above 0, as a budget's is.
+    #[inline]
+    pub(crate) fn steered(self, factor: f64) -> Self {
+        Self { k: (self.k / factor).clamp(1.0, f64::MAX), ..self }
     }
 
     /// Whether two views look through the same cone, wherever it stands and points.
     #[must_use]
     pub fn same_cone(&self, other: &Self) -> bool {
         self.cos_beta == other.cos_beta && self.sin_beta == other.sin_beta
+    }
+
+    /// What no constructor makes, to see what comes of it.
+    #[cfg(test)]
+    pub(crate) fn unchecked(eye: DVec3, direction: DVec3, cos_beta: f64, sin_beta: f64, k: f64) -> Self {
+        Self { eye, direction, cos_beta, sin_beta, k }
     }
 }

@@ -60,7 +60,7 @@ fn a_path_that_has_been_walked_before_allocates_nothing() {
         let mut view = random_view(&mut random);
         let mut views: Vec<View> = Vec::new();
         for _ in 0..150 {
-            view.eye -= view.eye * 0.002;
+            view = view.with_eye(view.eye() - view.eye() * 0.002).unwrap();
             turn(&mut view, 0.004, &mut random);
             views.push(view);
         }

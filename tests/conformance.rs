@@ -1,6 +1,8 @@
 //! Every backend with every exact strategy against the brute-force cut, in every frame of long walks over built-in
 //! scenes and real meshes.
 
+#![expect(clippy::disallowed_methods, reason = "random shapes and motions, or figures to compare with")]
+
 mod common;
 
 use std::f64::consts::PI;
@@ -35,7 +37,7 @@ fn settings_for(path: &Path) -> Settings {
 fn follow(log: &CollapseLog, path: &Path, theta: f64, criterion: Criterion) -> Totals {
     let mut table = Conformance::new(log, Settings { criterion, ..settings_for(path) });
     for frame in 0..path.frames.len() {
-        table.advance(&[View::new(&path.camera(frame), theta)]);
+        table.advance(&[path.view(frame, theta).unwrap()]);
     }
     let totals = table.totals;
     eprintln!("{}: {totals:?}", path.name);
@@ -88,7 +90,7 @@ impl Placed {
     }
 
     fn view(&self, view: View) -> View {
-        View { eye: self.center + self.scale * view.eye, ..view }
+        view.with_eye(self.center + self.scale * view.eye()).unwrap()
     }
 }
 
@@ -102,7 +104,7 @@ fn random_walk(criterion: Criterion, k: f64, seed: u64, frames: usize) {
     let settings = Settings { criterion, rho: 0.02 * placed.scale, omega: 0.02, ..Settings::default() };
     let mut table = Conformance::new(log, settings);
     let mut random = Random(seed);
-    let mut view = View { k, ..random_view(&mut random) };
+    let mut view = random_view(&mut random).with_k(k).unwrap();
     for frame in 0..frames {
         if frame == ALL_BACKENDS {
             table.go_on_with_the_first();
@@ -134,13 +136,14 @@ fn a_pan_of_a_million_frames() {
     let mut random = Random(3);
     // From within, so that the mesh is on all sides.
     let eye = DVec3::new(0.1, -0.2, 0.1);
-    let mut view = View { eye, k: 200.0, ..random_view(&mut random) };
-    let axis = view.direction.any_orthonormal_vector();
+    let mut view = random_view(&mut random).with_k(200.0).unwrap().with_eye(eye).unwrap();
+    let axis = view.direction().any_orthonormal_vector();
     for frame in 0..1_000_000 {
         if frame == 10 * ALL_BACKENDS {
             table.go_on_with_the_first();
         }
-        view.direction = (DQuat::from_axis_angle(axis, 1e-5) * view.direction).normalize();
+        view =
+            view.with_direction((DQuat::from_axis_angle(axis, 1e-5) * view.direction()).normalize()).unwrap();
         table.advance(&[placed.view(view)]);
     }
     eprintln!("{:?}", table.totals);
@@ -153,7 +156,7 @@ fn a_pan_of_a_million_frames() {
 #[test]
 fn a_zoom() {
     let Some(log) = bunny() else { return };
-    let path = around(&log.mesh);
+    let path = around(&log.mesh).unwrap();
     let mut table = Conformance::new(log, settings_for(&path));
     for frame in 0..5000 {
         let phase = f64::from(frame) / 1000.0;
@@ -163,8 +166,9 @@ fn a_zoom() {
         // From frame 360 on the mesh is larger than the view.
         let moving = if frame / 1000 == 3 { frame as usize % 720 } else { 400 };
         let aspect = if frame / 1000 == 4 { swing(0.1, 2.0) } else { 1.8 };
-        let camera = Camera { fov_y: f64::to_radians(fov_y), aspect, ..path.camera(moving) };
-        table.advance(&[View::new(&camera, pixels(theta))]);
+        let at = path.camera(moving).unwrap();
+        let camera = Camera::new(at.position(), at.orientation(), f64::to_radians(fov_y), aspect).unwrap();
+        table.advance(&[View::new(&camera, pixels(theta)).unwrap()]);
     }
     eprintln!("{:?}", table.totals);
     assert!(table.totals.changes > 20_000, "{:?}", table.totals);
@@ -174,7 +178,7 @@ fn a_zoom() {
 #[test]
 fn a_budget_tightened_and_loosened() {
     let Some(log) = bunny() else { return };
-    let path = around(&log.mesh);
+    let path = around(&log.mesh).unwrap();
     let mut table = Conformance::new(log, settings_for(&path));
     for (round, budget) in [20_000, 4_000, 12_000, 0, 1_000, 30_000].into_iter().enumerate() {
         table.set_budget(if budget == 0 { Budget::None } else { Budget::Triangles(budget) });
@@ -182,7 +186,7 @@ fn a_budget_tightened_and_loosened() {
         for frame in 0..600 {
             // At rest, the budget is what moves the front.
             let at = (round * 300 + frame.min(300)) % path.frames.len();
-            table.advance(&[View::new(&path.camera(at), pixels(0.25))]);
+            table.advance(&[path.view(at, pixels(0.25)).unwrap()]);
         }
         eprintln!("{budget}: {:?}", table.totals);
         if budget != 0 {
@@ -197,12 +201,12 @@ fn a_budget_tightened_and_loosened() {
 #[test]
 fn a_budget_in_time() {
     let Some(log) = bunny() else { return };
-    let path = around(&log.mesh);
+    let path = around(&log.mesh).unwrap();
     let mut table = Conformance::new(log, settings_for(&path));
     for microseconds in [5, 50, 1] {
         table.set_budget(Budget::FrameTime(Duration::from_micros(microseconds)));
         for frame in 0..300 {
-            table.advance_each(&[View::new(&path.camera(frame), pixels(1.0))]);
+            table.advance_each(&[path.view(frame, pixels(1.0)).unwrap()]);
         }
     }
     assert!(table.totals.changes > 20_000, "{:?}", table.totals);
@@ -216,12 +220,12 @@ fn several_views() {
     let placed = Placed::around(&log.mesh);
     let mut table = Conformance::new(log, Settings { rho: 0.02 * placed.scale, ..Settings::default() });
     let mut random = Random(4);
-    let mut left = View { k: 300.0, ..random_view(&mut random) };
-    let mut shadow = View { k: 50.0, ..random_view(&mut random) };
+    let mut left = random_view(&mut random).with_k(300.0).unwrap();
+    let mut shadow = random_view(&mut random).with_k(50.0).unwrap();
     for frame in 0..4000 {
         random_step(&mut left, &mut random);
         turn(&mut shadow, 0.001, &mut random);
-        let right = View { eye: left.eye + 0.01 * left.direction.any_orthonormal_vector(), ..left };
+        let right = left.with_eye(left.eye() + 0.01 * left.direction().any_orthonormal_vector()).unwrap();
         let views = [left, right, shadow].map(|view| placed.view(view));
         table.advance(&views[..[3, 2, 1, 0, 3][frame / 40 % 5]]);
     }

@@ -32,7 +32,7 @@ fn nominal_is_measured(mesh: &str, trajectory: &str, mode: Mode, frames: usize) 
     let options = Options::default();
     for n in 0..frames {
         let frame = (2 * n + 1) * path.frames.len() / (2 * frames);
-        let camera = path.camera(frame);
+        let camera = path.camera(frame).unwrap();
         let mesh = subject.frame(&path, frame, &options).unwrap();
         let adaptive = reference.deviation(&mesh, &camera, LINES);
         let (forward, reverse) = (adaptive.forward.inner, adaptive.reverse.inner);

@@ -1,5 +1,7 @@
 //! Every strategy against the brute-force cut, on hierarchies and motions that are as nasty as random can make them.
 
+#![expect(clippy::disallowed_methods, reason = "random shapes and motions, or figures to compare with")]
+
 mod common;
 
 use std::collections::BTreeSet;
@@ -60,18 +62,18 @@ fn all_strategies_agree_with_the_oracle_and_show_its_mesh() {
         let settings = Settings { criterion, rho: speed.0, omega: speed.1, ..Settings::default() };
         let mut engines: Vec<_> =
             Strategy::ALL.iter().map(|&strategy| engine(&log, Settings { strategy, ..settings })).collect();
-        let mut views = vec![View { k, ..random_view(&mut random) }];
+        let mut views = vec![random_view(&mut random).with_k(k).unwrap()];
         for frame in 0..400 {
             for view in &mut views {
                 random_step(view, &mut random);
             }
             match frame {
                 // A second eye for a while, none at all for a moment, another lens, another tolerance.
-                100 => views.push(View { k: k / 3.0, ..random_view(&mut random) }),
+                100 => views.push(random_view(&mut random).with_k(k / 3.0).unwrap()),
                 200 => views.clear(),
-                201 => views.push(View { k, ..random_view(&mut random) }),
-                250 => (views[0].cos_beta, views[0].sin_beta) = (0.8, 0.6),
-                300 => views[0].k *= 3.0,
+                201 => views.push(random_view(&mut random).with_k(k).unwrap()),
+                250 => views[0] = views[0].with_cone(0.8, 0.6).unwrap(),
+                300 => views[0] = views[0].with_k(3.0 * views[0].k()).unwrap(),
                 _ => {}
             }
             for engine in &mut engines {
@@ -106,10 +108,12 @@ fn a_slow_pan_flips_every_node_in_its_frame() {
     let tree = InMemoryTree::new(Arc::new(Hierarchy::new(&log).unwrap()));
     let mut engine = Engine::new(tree, NullSink, Settings { rho: 0.05, ..Settings::default() }).unwrap();
     let mut view = random_view(&mut random);
-    let axis = view.direction.any_orthogonal_vector().normalize();
+    let axis = view.direction().any_orthogonal_vector().normalize();
     let (mut changes, mut tests) = (0, 0);
     for frame in 0..1_000_000 {
-        view.direction = (glam::DQuat::from_axis_angle(axis, 1e-5) * view.direction).normalize();
+        view = view
+            .with_direction((glam::DQuat::from_axis_angle(axis, 1e-5) * view.direction()).normalize())
+            .unwrap();
         let report = engine.advance(&[view]).unwrap();
         changes += report.unfolds + report.folds;
         tests += report.tests;
@@ -145,7 +149,8 @@ fn a_triangle_budget_is_met_and_the_cut_stays_exact() {
         let mut engine = engine(&log, settings);
         // From outside of every sphere: what the eye is inside of is shown at any tolerance.
         let eye = 5.0 * random.direction();
-        let mut view = View { eye, direction: -eye.normalize(), ..random_view(&mut random) };
+        let view = random_view(&mut random).with_eye(eye).unwrap();
+        let mut view = view.with_direction(-eye.normalize()).unwrap();
         for (budget, frames) in [(600, 500), (200, 500), (1500, 500)] {
             engine.set_budget(Budget::Triangles(budget));
             let mut last = 0;
@@ -173,10 +178,10 @@ fn unfolding_everything_gives_the_input_and_folding_everything_the_base_mesh() {
     let mut engine = engine(&log, Settings::default());
     let base = shown(&engine);
     assert_eq!(base, displayed(&log, &vec![false; log.collapses.len()]));
-    let near = View { k: 1e12, ..random_view(&mut random) };
+    let near = random_view(&mut random).with_k(1e12).unwrap();
     // Looking every way at once.
     let everywhere: Vec<View> =
-        (0..6).map(|i| View { direction: [1.0, -1.0][i % 2] * glam::DVec3::AXES[i / 2], ..near }).collect();
+        (0..6).map(|i| near.with_direction([1.0, -1.0][i % 2] * glam::DVec3::AXES[i / 2]).unwrap()).collect();
     let report = engine.advance(&everywhere).unwrap();
     assert_eq!(report.active_nodes, log.collapses.len() as u64);
     let all: BTreeSet<_> = (0..).zip(log.mesh.triangles.iter().copied()).collect();
@@ -232,7 +237,7 @@ fn capped_work_is_carried_and_ends_at_the_cut() {
         let mut view = random_view(&mut random);
         for frame in 0..400 {
             if frame < 30 {
-                view.eye += random.direction() * 0.02;
+                view = view.with_eye(view.eye() + random.direction() * 0.02).unwrap();
                 turn(&mut view, 0.02, &mut random);
             }
             let reports = engines.each_mut().map(|engine| engine.advance(&[view]).unwrap());

@@ -1,5 +1,7 @@
 //! What the engine foresees against what comes.
 
+#![expect(clippy::disallowed_methods, reason = "random shapes and motions, or figures to compare with")]
+
 mod common;
 
 use std::collections::{BTreeMap, HashMap};
@@ -59,7 +61,8 @@ fn a_steady_camera_is_foreseen_exactly() {
             let (step, turn) = (random.direction() * 0.015, DQuat::from_axis_angle(random.direction(), 0.01));
             let at = |frame: u32| {
                 let turn = (0..frame).fold(DQuat::IDENTITY, |all, _| turn * all);
-                View { eye: start.eye + step * f64::from(frame), direction: turn * start.direction, ..start }
+                let view = start.with_eye(start.eye() + step * f64::from(frame)).unwrap();
+                view.with_direction(turn * start.direction()).unwrap()
             };
             let (mut right, mut wrong) = (0, 0);
             for frame in 0..60 {
@@ -115,8 +118,8 @@ fn nothing_is_named_that_can_not_be_due() {
             });
             assert_eq!(all[0], all[1], "seed {seed}, frame {frame}: top-down and front");
             assert_eq!(all[0], all[2], "seed {seed}, frame {frame}: top-down and event");
-            let moved = |(b, a): (&View, &View)| b.eye.distance(a.eye);
-            let turned = |(b, a): (&View, &View)| b.direction.angle_between(a.direction);
+            let moved = |(b, a): (&View, &View)| b.eye().distance(a.eye());
+            let turned = |(b, a): (&View, &View)| b.direction().angle_between(a.direction());
             let pairs = || before.iter().zip(&views);
             let course = Course::from(Speed {
                 rho: pairs().map(moved).fold(0.01, f64::max),
@@ -155,7 +158,7 @@ fn nothing_is_foreseen_without_need() {
         let mut view = random_view(&mut random);
         let mut foreseen = 0;
         for _ in 0..50 {
-            view.eye -= view.eye * 0.004;
+            view = view.with_eye(view.eye() - view.eye() * 0.004).unwrap();
             foreseen += engine.advance(&[view]).unwrap().foreseen;
         }
         assert!(foreseen > 20, "{}: {foreseen}", strategy.name());
@@ -165,7 +168,7 @@ fn nothing_is_foreseen_without_need() {
         }
         engine.tree_mut().look_ahead = 0;
         for _ in 0..50 {
-            view.eye += view.eye * 0.004;
+            view = view.with_eye(view.eye() + view.eye() * 0.004).unwrap();
             assert_eq!(engine.advance(&[view]).unwrap().foreseen, 0);
         }
     }
@@ -177,7 +180,9 @@ fn a_jump_is_not_carried_on() {
     let (_, hierarchy) = hierarchy(4, 60);
     let settings = Settings { rho: 0.01, omega: 0.01, ..Settings::default() };
     let mut engine = walker(&hierarchy, settings, 4);
-    let view = |eye: DVec3| View { eye, direction: -eye.normalize(), ..random_view(&mut Random(1)) };
+    let view = |eye: DVec3| {
+        random_view(&mut Random(1)).with_eye(eye).and_then(|v| v.with_direction(-eye.normalize())).unwrap()
+    };
     let eye = DVec3::new(0.3, 0.4, 1.1);
     engine.advance(&[view(eye)]).unwrap();
     engine.advance(&[view(eye)]).unwrap();
@@ -237,7 +242,7 @@ fn score(engine: &mut Walker, path: &Path, frames: usize) -> Score {
     let mut score = Score::default();
     let mut expected: HashMap<NodeId, usize> = HashMap::new();
     for frame in 0..frames.min(path.frames.len()) {
-        let view = View::new(&path.camera(frame), theta_of_pixels(1.0, 1080));
+        let view = path.view(frame, theta_of_pixels(1.0, 1080)).unwrap();
         engine.advance(&[view]).unwrap();
         let tree = engine.tree();
         if frame > 0 {

@@ -1,5 +1,7 @@
 //! Several objects in one scene: placements, scene files, and a hundred objects under one budget.
 
+#![expect(clippy::disallowed_methods, reason = "random shapes and motions, or figures to compare with")]
+
 mod common;
 
 use std::path::Path;
@@ -45,12 +47,32 @@ fn a_placement_is_what_its_matrix_says() {
         assert!(read.place(point).distance(placement.place(point)) < 1e-9, "{placement:?}, {read:?}");
         // What is seen of the object in the scene is what is seen of it in its own space.
         let view = random_view(&mut random);
-        let own = placement.view(&view);
-        let (there, here) = (placement.place(point) - view.eye, point - own.eye);
+        let own = placement.view(&view).unwrap();
+        let (there, here) = (placement.place(point) - view.eye(), point - own.eye());
         assert!((there.length() - placement.scale * here.length()).abs() < 1e-9);
-        assert!((there.normalize().dot(view.direction) - here.normalize().dot(own.direction)).abs() < 1e-9);
-        assert_eq!((own.cos_beta, own.k), (view.cos_beta, view.k));
+        assert!(
+            (there.normalize().dot(view.direction()) - here.normalize().dot(own.direction())).abs() < 1e-9
+        );
+        assert_eq!((own.cos_beta(), own.k()), (view.cos_beta(), view.k()));
     }
+}
+
+/// Anybody may make a placement: one that leaves an eye nowhere is an error, of the object that has it.
+#[test]
+fn a_view_that_is_none_of_an_object_is_refused() {
+    let mut random = Random(2);
+    let view = random_view(&mut random);
+    let good = random_placement(&mut random, 5.0);
+    for wrong in [
+        Placement { scale: 0.0, ..good },
+        Placement { scale: 1e-160, ..good },
+        Placement { scale: f64::NAN, ..good },
+        Placement { translation: DVec3::splat(1e151), ..good },
+        Placement { rotation: DQuat::from_xyzw(0.0, 0.0, 0.0, 0.0), ..good },
+    ] {
+        assert!(wrong.view(&view).is_err(), "{wrong:?}");
+    }
+    assert!(good.view(&view).is_ok());
 }
 
 #[test]
@@ -98,7 +120,7 @@ fn scene_files() {
 
 /// The views as an object sees them.
 fn own_views(placement: &Placement, views: &[View]) -> Vec<View> {
-    views.iter().map(|view| placement.view(view)).collect()
+    views.iter().map(|view| placement.view(view).unwrap()).collect()
 }
 
 /// A hundred objects of three kinds under one budget with one reader, far from the origin of the scene: every front is
@@ -130,13 +152,13 @@ fn a_hundred_objects_share_a_budget() {
         parts.push((MtTree::new(files[i % 3].clone(), settings).unwrap(), NullSink, placement));
     }
     let mut scene = Objects::new(parts, Settings { rho: 0.05, ..Settings::default() }).unwrap();
-    let mut view = View { k: 40.0, ..random_view(&mut random) };
+    let mut view = random_view(&mut random).with_k(40.0).unwrap();
     let mut changes = 0;
     for round in 0..12 {
         let mut views = [view];
         for _ in 0..10 {
             random_step(&mut view, &mut random);
-            views = [View { eye: home + 4.0 * view.eye, ..view }];
+            views = [view.with_eye(home + 4.0 * view.eye()).unwrap()];
             let report = scene.advance(&views).unwrap();
             changes += report.unfolds + report.folds;
             assert!(memory.used() <= memory.limit());
@@ -177,10 +199,10 @@ fn every_strategy_shows_the_same() {
         })
         .collect();
     let mut oracle = Oracle::new(&log).unwrap();
-    let mut view = View { k: 150.0, ..random_view(&mut random) };
+    let mut view = random_view(&mut random).with_k(150.0).unwrap();
     for frame in 0..400 {
         random_step(&mut view, &mut random);
-        let views = [View { eye: 2.0 * view.eye, ..view }];
+        let views = [view.with_eye(2.0 * view.eye()).unwrap()];
         let hashes: Vec<u64> = scenes.iter_mut().map(|s| s.advance(&views).unwrap().cut_hash).collect();
         assert!(hashes.iter().all(|&hash| hash == hashes[0]), "frame {frame}");
         for object in scenes[frame % 3].objects() {
@@ -209,11 +231,11 @@ fn a_scene_file_is_replayed() {
     std::fs::write(&file, text).unwrap();
     let scene = StoredScene::open(&file).unwrap();
     assert_eq!((scene.files().len(), scene.objects().len()), (2, 100));
-    let mut view = View { k: 60.0, ..random_view(&mut random) };
+    let mut view = random_view(&mut random).with_k(60.0).unwrap();
     let views: Vec<View> = (0..40)
         .map(|_| {
             random_step(&mut view, &mut random);
-            View { eye: 4.0 * view.eye, ..view }
+            view.with_eye(4.0 * view.eye()).unwrap()
         })
         .collect();
     let memory = Memory::new(scene.least_memory().max(60_000));

@@ -1,5 +1,7 @@
 //! Walkthroughs: files, the recorded paths, and trajectories brought to meshes.
 
+#![expect(clippy::disallowed_methods, reason = "random shapes and motions, or figures to compare with")]
+
 use std::path::Path as FilePath;
 
 use foldfront::path::{Path, PathError, Pose, generate, recorded};
@@ -20,7 +22,7 @@ fn a_path_is_read() {
     assert_eq!(path.fov_y, 60f64.to_radians());
     assert_eq!(path.frames[1].position, DVec3::new(1.0, 2.0, 4.0));
     assert_eq!(parse(&format!("\u{feff}{GOOD}")).unwrap(), path);
-    assert_eq!(path.camera(1).orientation, DQuat::from_xyzw(0.0, 0.0, 0.6, 0.8));
+    assert_eq!(path.camera(1).unwrap().orientation(), DQuat::from_xyzw(0.0, 0.0, 0.6, 0.8));
     assert_eq!(parse("# fov 1.25 rad\n#aspect 2\n0 0 0 0 0 0 0 2").unwrap().fov_y, 1.25);
     assert_eq!(parse("# fov 60\n#aspect 2\n0 0 0 0 0 0 0 2").unwrap().frames[0].orientation, DQuat::IDENTITY);
     assert_eq!(parse("# fov 60\n#aspect 2\n0 0 0 0 0 0 0 2").unwrap().name, "test");
@@ -40,6 +42,10 @@ fn errors_name_file_line_and_value() {
         ("0 1 2 x 0 0 0 1", "dir/test.path:1: \"x\" is not a finite number"),
         ("0 1 NaN 3 0 0 0 1", "dir/test.path:1: \"NaN\" is not a finite number"),
         ("0 1 2 1e999 0 0 0 1", "dir/test.path:1: \"1e999\" is not a finite number"),
+        (
+            "0 1 2 1e160 0 0 0 1",
+            "dir/test.path:1: the eye [1.0, 2.0, 1e160] is not finite, or farther away than 1e150",
+        ),
         ("0 1 2 3 0 0 0 0", "dir/test.path:1: the quaternion [0.0, 0.0, 0.0, 0.0] is no rotation"),
         ("0 1 2 3 0 0 0 1e200", "dir/test.path:1: the quaternion [0.0, 0.0, 0.0, 1e200] is no rotation"),
         ("1 1 2 3 0 0 0 1\n1 1 2 3 0 0 0 1", "dir/test.path:2: the time 1 is not after 1"),
@@ -82,6 +88,28 @@ fn a_path_survives_a_file() {
     path.write(&file).unwrap();
     assert_eq!(Path::read(&file).unwrap(), path);
     assert!(matches!(path.write(&folder.path().join("no/walk.path")), Err(PathError::Write { .. })));
+}
+
+/// The fields of a path are anybody's: what is wrong with a camera is said where one is made, and nothing wrong is written.
+#[test]
+fn a_path_made_by_hand_is_checked_where_it_is_used() {
+    let folder = tempfile::tempdir().unwrap();
+    let good = parse(GOOD).unwrap();
+    assert!(good.view(0, 0.01).is_ok());
+    let wrong: [fn(&mut Path); 6] = [
+        |path| path.fov_y = f64::NAN,
+        |path| path.aspect = 0.0,
+        |path| path.frames[1].position.y = f64::INFINITY,
+        |path| path.frames[1].position.y = 1e151,
+        |path| path.frames[1].orientation = DQuat::from_xyzw(0.0, 0.0, 0.0, f64::NAN),
+        |path| path.frames[1].orientation = DQuat::from_xyzw(0.0, 0.0, 0.0, 0.0),
+    ];
+    for spoil in wrong {
+        let mut path = good.clone();
+        spoil(&mut path);
+        assert!(path.camera(1).is_err() && path.view(1, 0.01).is_err(), "{path:?}");
+        assert!(path.write(&folder.path().join("walk.path")).is_err(), "{path:?}");
+    }
 }
 
 #[test]
@@ -183,7 +211,7 @@ mod importing {
 
     fn direction(comment: &str, quaternion: &str) -> (DVec3, DVec3) {
         let text = format!("# {comment}\n0 0 0 0 {quaternion}\n1 1 1 0 {quaternion}\n");
-        let camera = fitted(&text, &terrain(), Mode::Fly).camera(0);
+        let camera = fitted(&text, &terrain(), Mode::Fly).camera(0).unwrap();
         (camera.direction(), camera.up())
     }
 
@@ -241,11 +269,11 @@ mod importing {
         let middle = DVec3::new(10.0, 20.0, -5.0);
         let path = fitted(POSES, &octahedron(), Mode::Orbit);
         for frame in 0..path.frames.len() {
-            let camera = path.camera(frame);
-            let to_middle = middle - camera.position;
+            let camera = path.camera(frame).unwrap();
+            let to_middle = middle - camera.position();
             assert!(to_middle.normalize().dot(camera.direction()) > 9f64.to_radians().cos());
             assert!((1.39..2.41).contains(&(to_middle.length() / 12f64.sqrt())));
-            assert!(camera.position.y > middle.y && camera.up().y > 0.5, "y is up in a scanned object");
+            assert!(camera.position().y > middle.y && camera.up().y > 0.5, "y is up in a scanned object");
         }
     }
 
@@ -262,7 +290,7 @@ mod importing {
     #[test]
     fn positions_alone_look_where_they_go() {
         let east: String = (0..60).map(|t| format!("{t} {} 0 100\n", 10 * t)).collect();
-        let level = |path: &Path| path.camera(900).direction().with_z(0.0).normalize();
+        let level = |path: &Path| path.camera(900).unwrap().direction().with_z(0.0).normalize();
         let path = fitted(&east, &terrain(), Mode::Walk);
         assert_near(level(&path), DVec3::X);
         let north: String =

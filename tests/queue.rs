@@ -1,5 +1,7 @@
 //! The event queue against an ordered map, and the time bounds against random motion.
 
+#![expect(clippy::disallowed_methods, reason = "random shapes and motions, or figures to compare with")]
+
 use std::collections::BTreeMap;
 use std::collections::btree_map::Entry;
 
@@ -252,28 +254,25 @@ impl Random {
 
     fn view(&mut self) -> View {
         let beta = 0.1 + 1.3 * self.unit();
-        View {
-            eye: self.direction() * 12.0 * self.unit(),
-            direction: self.direction(),
-            cos_beta: beta.cos(),
-            sin_beta: beta.sin(),
-            k: 1.0 + 200.0 * self.unit(),
-        }
+        let (eye, direction) = (self.direction() * 12.0 * self.unit(), self.direction());
+        View::from_parts(eye, direction, beta.cos(), beta.sin(), 1.0 + 200.0 * self.unit()).unwrap()
     }
 
     /// Moves a view by up to full speed in each way at once, as often as not straight at or away from the centre.
     fn step(&mut self, view: &mut View, course: &Course, center: [f32; 3]) {
-        let to_center = (DVec3::from(center.map(f64::from)) - view.eye).normalize_or(DVec3::X);
+        let to_center = (DVec3::from(center.map(f64::from)) - view.eye()).normalize_or(DVec3::X);
         let sign = if self.unit() < 0.5 { 1.0 } else { -1.0 };
         let way = if self.unit() < 0.6 { to_center * sign } else { self.direction() };
-        view.eye += course.heading * course.rho * self.unit() + way * course.stray * self.unit();
+        let moved = course.heading * course.rho * self.unit() + way * course.stray * self.unit();
+        *view = view.with_eye(view.eye() + moved).unwrap();
         let aim = if self.unit() < 0.6 { to_center * sign } else { self.direction() };
-        let axis = view.direction.cross(aim);
+        let axis = view.direction().cross(aim);
         if axis.length() > 1e-9 {
             let turn = glam::DQuat::from_axis_angle(axis.normalize(), course.omega * self.unit());
-            view.direction = (turn * view.direction).normalize();
+            *view = view.with_direction((turn * view.direction()).normalize()).unwrap();
         }
-        view.k = (view.k + course.kappa * (self.unit() - 0.5) * 2.0).max(1.0);
+        let steered = course.kappa * (self.unit() - 0.5) * 2.0;
+        *view = view.with_k((view.k() + steered).max(1.0)).unwrap();
     }
 }
 

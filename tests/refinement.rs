@@ -11,7 +11,6 @@ use foldfront::active_mesh::ActiveMesh;
 use foldfront::cut::Displayed;
 use foldfront::engine::{Engine, Settings};
 use foldfront::vertex_tree::{MeshSink, NONE, NodeId, Step, VertexTree};
-use foldfront::view::View;
 use foldfront::{CollapseLog, Mesh};
 use glam::DVec3;
 use in_memory::{Hierarchy, InMemoryTree};
@@ -101,11 +100,11 @@ fn a_walk_shows_what_the_log_says(name: &str, log: &CollapseLog, hierarchy: &Arc
     let mesh = ActiveMesh::new();
     let mut engine = Engine::new(tree, mesh, Settings { rho: 0.02 * scale, ..Settings::default() }).unwrap();
     let mut random = Random(11);
-    let mut view = View { k: 500.0, ..random_view(&mut random) };
+    let mut view = random_view(&mut random).with_k(500.0).unwrap();
     let (mut most, mut changes) = (0, 0);
     for frame in 0..200 {
         random_step(&mut view, &mut random);
-        let report = engine.advance(&[View { eye: center + scale * view.eye, ..view }]).unwrap();
+        let report = engine.advance(&[view.with_eye(center + scale * view.eye()).unwrap()]).unwrap();
         most = most.max(report.triangles);
         changes += report.unfolds + report.folds;
         if frame % 20 == 19 {

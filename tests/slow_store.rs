@@ -35,7 +35,7 @@ fn log() -> CollapseLog {
 /// Down on the grid, nearer and nearer.
 fn view(frame: u32) -> View {
     let eye = DVec3::new(0.1, 0.2, 40.0 - 34.0 * f64::from(frame) / f64::from(FLIGHT));
-    View { eye, direction: -DVec3::Z, cos_beta: 0.8, sin_beta: 0.6, k: 400.0 }
+    View::from_parts(eye, -DVec3::Z, 0.8, 0.6, 400.0).unwrap()
 }
 
 fn settings(strategy: Strategy) -> Settings {

@@ -24,7 +24,7 @@ pub fn table() {
         let Some((log, _)) = log(name) else { continue };
         let file = open(&meta_nodes(name, &log, &BuildOptions::default()));
         let hierarchy = Arc::new(Hierarchy::new(&log).expect("valid"));
-        let walk = path::around(&log.mesh);
+        let walk = path::around(&log.mesh).expect("a place for a camera");
         let views = views(&walk, 1.0);
         for strategy in [Strategy::TopDown, Strategy::Front, Strategy::Event] {
             let settings = settings(&walk, strategy);

@@ -90,7 +90,7 @@ pub fn imported(trajectory: &str, log: &CollapseLog, mode: Mode, rate: f64) -> O
 
 pub fn views(path: &Path, pixels: f64) -> Vec<View> {
     let theta = theta_of_pixels(pixels, 1080);
-    (0..path.frames.len()).map(|frame| View::new(&path.camera(frame), theta)).collect()
+    (0..path.frames.len()).map(|frame| path.view(frame, theta).expect("a view")).collect()
 }
 
 /// Mean, median and 99th percentile.

@@ -14,6 +14,8 @@
 //!
 //! Frames are settled: each waits for its pages, and its cut is compared between modes; another cut fails the benchmark.
 
+#![expect(clippy::disallowed_methods, reason = "shapes to measure with")]
+
 mod figures;
 mod selection;
 mod within;
@@ -93,8 +95,8 @@ fn path(name: &str, mesh: &Mesh, frames: usize, place: impl Fn(f64) -> DVec3) ->
     let (fov_y, aspect) = (std::f64::consts::FRAC_PI_3, 16.0 / 9.0);
     let pose = |frame: usize| {
         let position = center + mesh.extent() * place(frame as f64 / (frames - 1) as f64);
-        let camera = Camera::look_at(position, center, DVec3::Y, fov_y, aspect);
-        Pose { time: frame as f64 / 60.0, position, orientation: camera.orientation }
+        let camera = Camera::look_at(position, center, DVec3::Y, fov_y, aspect).expect("a camera");
+        Pose { time: frame as f64 / 60.0, position, orientation: camera.orientation() }
     };
     Path {
         name: name.to_owned(),
@@ -121,7 +123,9 @@ fn turning(mesh: &Mesh) -> Path {
 }
 
 fn views(path: &Path) -> Vec<View> {
-    (0..path.frames.len()).map(|frame| View::new(&path.camera(frame), theta_of_pixels(1.0, 1080))).collect()
+    (0..path.frames.len())
+        .map(|frame| path.view(frame, theta_of_pixels(1.0, 1080)).expect("a view"))
+        .collect()
 }
 
 fn tree(file: &Arc<MtFile>, cache: CacheMode) -> MtTree {

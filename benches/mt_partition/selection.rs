@@ -80,7 +80,7 @@ fn paths(log: &CollapseLog) -> Vec<Path> {
     let file =
         PathBuf::from(concat!(env!("CARGO_MANIFEST_DIR"), "/../shared/data/paths/euroc_mh04_drone.txt"));
     let options = Options { mode: Mode::Fly, rate: 60.0, ..Options::default() };
-    let mut paths = vec![path::around(&log.mesh)];
+    let mut paths = vec![path::around(&log.mesh).expect("a place for a camera")];
     if file.exists() {
         paths.insert(0, import(&file, &log.mesh, &options).expect("a valid trajectory"));
     }

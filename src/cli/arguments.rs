@@ -5,11 +5,13 @@ use std::path::PathBuf;
 use std::time::Duration;
 
 use clap::{Args, Parser, Subcommand, ValueEnum};
+use glam::{DQuat, DVec3};
 use meta_node::Dependencies;
 use mt_partition::CacheMode;
 use vertex_tree::Prefetch;
 use vertex_tree::simulated::Simulated;
 
+use super::Misunderstood;
 use super::values::{backend, cache, duration, frames, positive, prefetch, size, strategy, work_cap};
 use crate::budget::WorkCap;
 use crate::compare::Pace;
@@ -17,6 +19,7 @@ use crate::criterion::Criterion;
 use crate::path::import;
 use crate::refine::Strategy;
 use crate::store::{Backend, BuildOptions};
+use crate::view::{Camera, View, theta_of_pixels};
 
 /// Event-driven view-dependent level of detail: build hierarchies, replay walkthroughs, compare strategies.
 #[derive(Debug, Parser)]
@@ -151,7 +154,18 @@ pub(super) const LINES: u32 = 1080;
 
 impl Refinement {
     pub fn theta(&self) -> f64 {
-        self.theta.unwrap_or_else(|| crate::view::theta_of_pixels(self.pixels.unwrap_or(1.0), LINES))
+        self.theta.unwrap_or_else(|| theta_of_pixels(self.pixels.unwrap_or(1.0), LINES))
+    }
+
+    /// Before any work: whether the tolerance is one for a lens of this field of view, in radians.
+    pub fn check(&self, fov_y: f64) -> Result<(), Misunderstood> {
+        let view = Camera::new(DVec3::ZERO, DQuat::IDENTITY, fov_y, 1.0);
+        let view = view.and_then(|camera| View::new(&camera, self.theta()));
+        let argument = match (self.theta, self.pixels) {
+            (Some(theta), _) => format!("--theta {theta:e}"),
+            (None, pixels) => format!("--pixels {:e}", pixels.unwrap_or(1.0)),
+        };
+        view.map(drop).map_err(|wrong| Misunderstood(format!("{argument}: {wrong}")))
     }
 }
 

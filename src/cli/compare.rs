@@ -29,6 +29,11 @@ pub(super) fn compare(command: &Compare) -> Result<()> {
         Input::all(&command.input)?
     };
     let paths: Vec<Path> = command.path.iter().map(|file| Path::read(file)).collect::<Result<_, _>>()?;
+    // What is recorded for a scene has the lens of a flight around.
+    let lenses: Vec<f64> = paths.iter().map(|path| path.fov_y).collect();
+    for &fov_y in if lenses.is_empty() { &[path::FOV_Y][..] } else { &lenses } {
+        command.refinement.check(fov_y)?;
+    }
     let options = options(command);
     // Before the work, not after it.
     let mut files: Vec<_> = inputs.iter().flat_map(Input::files).collect();
@@ -83,8 +88,8 @@ fn walks(input: &Input, subjects: &[Replayable], paths: &[Path]) -> Result<Vec<P
     Ok(match (paths, input, subjects) {
         ([], Input::Scene(scene), _) => path::recorded(scene.kind())?.to_vec(),
         // What is stored may not fit into memory.
-        ([], _, [Replayable { log: None, subject, .. }, ..]) => vec![path::around(&subject.outline()?)],
-        ([], _, [Replayable { log: Some(log), .. }, ..]) => vec![path::around(&log.mesh)],
+        ([], _, [Replayable { log: None, subject, .. }, ..]) => vec![path::around(&subject.outline()?)?],
+        ([], _, [Replayable { log: Some(log), .. }, ..]) => vec![path::around(&log.mesh)?],
         (paths, ..) => paths.to_vec(),
     })
 }
@@ -184,7 +189,7 @@ fn most_complex(run: &Run) -> usize {
 /// A frame from the camera and from outside.
 fn draw(subject: &Subject, walk: &Path, frame: usize, options: &Options) -> Result<[Picture; 2]> {
     let mesh = subject.frame(walk, frame, options)?;
-    let camera = walk.camera(frame);
+    let camera = walk.camera(frame)?;
     let style = Style { width: 960, ..Style::default() };
     let picture = |what: &str, image: Image| -> Result<Picture> {
         let caption =

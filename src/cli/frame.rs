@@ -51,9 +51,10 @@ fn check_output(output: &std::path::Path, content: Content, frame: &super::argum
 fn frame_mesh(frame: &super::arguments::FrameOf) -> Result<(Mesh, Camera)> {
     let path = Path::read(&frame.path)?;
     check_frame(&path, frame.frame)?;
+    frame.refinement.check(path.fov_y)?;
     let subject = subject(&frame.file)?.subject;
     let mesh = subject.frame(&path, frame.frame, &options(&frame.refinement))?;
-    Ok((mesh, path.camera(frame.frame)))
+    Ok((mesh, path.camera(frame.frame)?))
 }
 
 pub(super) fn export(command: &Export) -> Result<()> {
@@ -81,6 +82,7 @@ pub(super) fn deviation(command: &Deviation) -> Result<()> {
     for &frame in &command.frames {
         check_frame(&path, frame)?;
     }
+    command.refinement.check(path.fov_y)?;
     let Replayable { subject, log, .. } = subject(&command.file)?;
     let own;
     let original = match (command.against.as_slice(), &log) {
@@ -101,7 +103,7 @@ pub(super) fn deviation(command: &Deviation) -> Result<()> {
     for &frame in &command.frames {
         let measured = stage(&format!("measuring frame {frame}"), |_| {
             let mesh = subject.frame(&path, frame, &options)?;
-            anyhow::Ok(reference.deviation(&mesh, &path.camera(frame), LINES))
+            anyhow::Ok(reference.deviation(&mesh, &path.camera(frame)?, LINES))
         })?;
         let mut value = measured.to_json();
         value["frame"] = frame.into();

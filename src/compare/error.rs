@@ -7,7 +7,7 @@ use crate::objects::StoredSceneError;
 use crate::oracle::Difference;
 use crate::refine::Strategy;
 use crate::store::StoreError;
-use crate::view::View;
+use crate::view::{View, ViewError};
 
 /// A comparison stopped.
 #[derive(Debug, thiserror::Error)]
@@ -46,6 +46,16 @@ pub enum CompareError {
         backend: &'static str,
         /// How many nodes.
         wrong: u64,
+    },
+    /// A frame of a path has no view at the tolerance.
+    #[error("path {path}, frame {frame}: {source}")]
+    View {
+        /// The path.
+        path: String,
+        /// Number of the frame in the path.
+        frame: usize,
+        /// What is wrong with it.
+        source: ViewError,
     },
     /// The backend can not go on.
     #[error("{scene}: {source}")]
@@ -111,8 +121,8 @@ impl std::fmt::Display for WrongCut {
             bounds.eps,
         )?;
         for view in &self.views {
-            let distance = view.eye.distance(glam::DVec3::from(bounds.center.map(f64::from)));
-            let reach = self.criterion.reach_distance(&bounds, view.k);
+            let distance = view.eye().distance(glam::DVec3::from(bounds.center.map(f64::from)));
+            let reach = self.criterion.reach_distance(&bounds, view.k());
             let unfold = self.criterion.unfold_for(view, &bounds);
             write!(f, "; at distance {distance}, coarse within {reach}, wanted: {unfold}")?;
         }

@@ -7,13 +7,14 @@ use mt_partition::CacheMode;
 use vertex_tree::Prefetch;
 use vertex_tree::simulated::Simulated;
 
+use super::CompareError;
 use crate::budget::{Budget, WorkCap};
 use crate::criterion::Criterion;
 use crate::engine::Settings;
 use crate::motion::Speed;
 use crate::path::Path;
 use crate::refine::Strategy;
-use crate::view::theta_of_pixels;
+use crate::view::{View, theta_of_pixels};
 
 /// What to replay, and how.
 #[derive(Clone, Debug, PartialEq)]
@@ -118,6 +119,15 @@ impl Options {
             budget: self.budget,
             work_cap: self.work_cap,
         }
+    }
+
+    /// The view of a frame of a path.
+    pub(super) fn view(&self, path: &Path, frame: usize) -> Result<View, CompareError> {
+        path.view(frame, self.theta).map_err(|source| CompareError::View {
+            path: path.name.clone(),
+            frame,
+            source,
+        })
     }
 
     /// The full speed that is declared for a path: what the options say, otherwise the 99th percentile of its motion, or

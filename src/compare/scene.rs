@@ -17,7 +17,7 @@ use crate::view::View;
 /// replays.
 ///
 /// # Errors
-/// [`CompareError::Objects`], and [`CompareError::Disagree`] where the options ask for a check.
+/// [`CompareError::View`], [`CompareError::Objects`], and [`CompareError::Disagree`] where the options ask for a check.
 pub fn replay_scene(
     name: &str,
     scene: &StoredScene,
@@ -28,8 +28,7 @@ pub fn replay_scene(
 ) -> Result<Vec<Run>, CompareError> {
     let wrap = |source| CompareError::Objects { scene: name.to_owned(), source };
     let speed = options.declared_speed(path);
-    let views: Vec<View> =
-        frames.clone().map(|frame| View::new(&path.camera(frame), options.theta)).collect();
+    let views: Vec<View> = frames.clone().map(|frame| options.view(path, frame)).collect::<Result<_, _>>()?;
     let total = (options.prefetch.len() * options.strategies.len()) as u64;
     let mut runs: Vec<Run> = Vec::new();
     for &prefetch in &options.prefetch {

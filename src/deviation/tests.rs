@@ -5,7 +5,7 @@ use std::f64::consts::FRAC_PI_2;
 /// At the origin, looking along -z, 90 degrees high and wide: at depth `d` the image spans -d to d, and with 200
 /// lines one object unit straight ahead takes 100 / d pixels.
 fn camera() -> Camera {
-    Camera { position: DVec3::ZERO, orientation: DQuat::IDENTITY, fov_y: FRAC_PI_2, aspect: 1.0 }
+    Camera::new(DVec3::ZERO, DQuat::IDENTITY, FRAC_PI_2, 1.0).unwrap()
 }
 
 const LINES: u32 = 200;

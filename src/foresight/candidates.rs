@@ -129,7 +129,7 @@ fn reach(ahead: &Ahead) -> Option<Rates> {
         course.kappa = course.kappa.max(travel.steered);
     }
     // More than the arithmetic of the views can have lost.
-    let extent = ahead.frame.views.iter().map(|view| view.eye.length()).fold(0.0, f64::max);
+    let extent = ahead.frame.views.iter().map(|view| view.eye().length()).fold(0.0, f64::max);
     course.rho *= 1.0 + 1e-6;
     course.omega *= 1.0 + 1e-6;
     course.kappa *= 1.0 + 1e-6;

@@ -35,15 +35,15 @@ struct Rate {
 
 impl Rate {
     fn between(before: &View, after: &View) -> Self {
-        let (a, b) = (before.direction, after.direction);
+        let (a, b) = (before.direction(), after.direction());
         // To turn round within a frame says nothing of the next.
         let turned = if a.dot(b) > 0.0 { a.cross(b) / (1.0 + a.dot(b)) } else { DVec3::ZERO };
-        let sine = after.sin_beta * before.cos_beta - after.cos_beta * before.sin_beta;
-        let cosine = after.cos_beta * before.cos_beta + after.sin_beta * before.sin_beta;
+        let (old, new) = ([before.cos_beta(), before.sin_beta()], [after.cos_beta(), after.sin_beta()]);
+        let (cosine, sine) = (new[0] * old[0] + new[1] * old[1], new[1] * old[0] - new[0] * old[1]);
         Self {
-            moved: after.eye - before.eye,
+            moved: after.eye() - before.eye(),
             turned,
-            steered: after.k - before.k,
+            steered: after.k() - before.k(),
             widened: sine / (1.0 + cosine),
         }
     }
@@ -70,12 +70,12 @@ impl Rate {
         self.moved == DVec3::ZERO && self.turned == DVec3::ZERO && self.steered == 0.0 && self.widened == 0.0
     }
 
-    /// The view a frame later.
+    /// The view a frame later; the same where that would be none.
     fn apply(&self, view: &View) -> View {
         let turn = 2.0 / (1.0 + self.turned.length_squared());
-        let across = self.turned.cross(view.direction);
-        let direction = view.direction + turn * (across + self.turned.cross(across));
-        let (mut cos_beta, mut sin_beta) = (view.cos_beta, view.sin_beta);
+        let across = self.turned.cross(view.direction());
+        let direction = view.direction() + turn * (across + self.turned.cross(across));
+        let (mut cos_beta, mut sin_beta) = (view.cos_beta(), view.sin_beta());
         if self.widened != 0.0 {
             let w = self.widened;
             let wider = ((1.0 - w * w) * cos_beta - 2.0 * w * sin_beta).clamp(-1.0, 1.0) / (1.0 + w * w);
@@ -85,13 +85,9 @@ impl Rate {
                 (cos_beta, sin_beta) = (wider, sine);
             }
         }
-        View {
-            eye: view.eye + self.moved,
-            direction: direction.normalize_or(view.direction),
-            cos_beta,
-            sin_beta,
-            k: (view.k + self.steered).max(1.0),
-        }
+        let direction = direction.normalize_or(view.direction());
+        let k = (view.k() + self.steered).max(1.0);
+        View::from_parts(view.eye() + self.moved, direction, cos_beta, sin_beta, k).unwrap_or(*view)
     }
 }
 

@@ -46,6 +46,7 @@ const FOOT: u16 = 9002;
 const US_SURVEY_FOOT: u16 = 9003;
 
 /// Where the samples of a map of so many columns and rows are, in metres, or what is not known of it.
+#[expect(clippy::disallowed_methods, reason = "input, before there is anything to select")]
 pub(super) fn locate(tags: &GeoTags, size: [u32; 2]) -> Result<Location, String> {
     let is_geographic = match tags.code(MODEL_TYPE) {
         Some(model) => model == MODEL_GEOGRAPHIC,

@@ -282,6 +282,7 @@ struct Mosaic {
 
 impl Mosaic {
     /// `tiles` are sorted and at least one.
+    #[expect(clippy::disallowed_methods, reason = "input, before there is anything to select")]
     fn new(tiles: Vec<Tile>, side: usize) -> Self {
         let (top, bottom) = (tiles[0].south, tiles[tiles.len() - 1].south);
         let west = tiles.iter().map(|t| t.west).min().unwrap_or(0);
@@ -393,6 +394,7 @@ mod tests {
     ///   3 3 3
     /// ```
     #[test]
+    #[expect(clippy::disallowed_methods, reason = "to compare with")]
     fn seams_have_one_owner_and_missing_tiles_are_holes() {
         let samples = |tile: i16| (0..9).map(move |i| 100 * tile + 10 * (i / 3) + i % 3).collect::<Vec<_>>();
         let mut with_void = samples(1);

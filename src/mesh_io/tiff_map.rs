@@ -210,6 +210,7 @@ struct Void {
 const SHORTENED_DIGITS: usize = 6;
 
 impl Void {
+    #[expect(clippy::disallowed_methods, reason = "input, before there is anything to select")]
     fn new(text: &str) -> Option<Self> {
         let text = text.trim_matches(|c: char| c == '\0' || c.is_ascii_whitespace());
         let value: f64 = text.parse().ok()?;

@@ -9,10 +9,10 @@ use std::time::Duration;
 
 use mt_partition::{MtError, MtFile, MtTree, Reader};
 use rustc_hash::FxHashMap;
+use vertex_tree::NullSink;
 use vertex_tree::source::FileSource;
-use vertex_tree::{NullSink, TreeError};
 
-use super::{Objects, Placement, SceneFileError, read_scene};
+use super::{Objects, ObjectsError, Placement, SceneFileError, read_scene};
 use crate::engine::{FrameReport, Settings};
 use crate::view::View;
 
@@ -34,9 +34,9 @@ pub enum StoredSceneError {
     /// A file that it names is damaged, or of another backend.
     #[error(transparent)]
     File(#[from] MtError),
-    /// A tree can not go on.
+    /// An object can not go on.
     #[error(transparent)]
-    Tree(#[from] TreeError),
+    Objects(#[from] ObjectsError),
 }
 
 /// The files of a scene, and where its objects are.

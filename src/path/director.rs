@@ -183,6 +183,7 @@ fn sin_cos(angle: f64) -> (f64, f64) {
 }
 
 #[cfg(test)]
+#[expect(clippy::disallowed_methods, reason = "the platform's own, to compare with")]
 mod tests {
     use super::*;
 

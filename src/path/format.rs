@@ -8,6 +8,7 @@ use glam::{DQuat, DVec3};
 use thiserror::Error;
 
 use super::{Path, Pose, text};
+use crate::view::{ViewError, check_aspect, check_eye, check_fov, check_orientation};
 
 /// Why a path could not be read or written. Lines count from 1.
 #[derive(Debug, Error)]
@@ -60,6 +61,16 @@ pub enum PathError {
         time: f64,
         /// The time of the frame before.
         previous: f64,
+    },
+    /// A camera is nowhere that a camera can be.
+    #[error("{}:{line}: {source}", file.display())]
+    Camera {
+        /// The file.
+        file: PathBuf,
+        /// The line.
+        line: usize,
+        /// What is wrong.
+        source: ViewError,
     },
     /// A quaternion is zero, or too small or large to be made a rotation.
     #[error("{}:{line}: the quaternion {value:?} is no rotation", file.display())]
@@ -204,6 +215,7 @@ impl Path {
                     return Err(at.not_a_number(&number.to_string()));
                 }
             }
+            at.camera(check_eye(p))?;
             at.rotation(quaternion)?;
             if let Some(previous) = previous.replace(time) {
                 at.check_time(time, previous)?;
@@ -247,17 +259,17 @@ impl Line<'_> {
 
     /// Radians; `value` is what stands in the file.
     fn check_fov(self, fov_y: f64, value: &str) -> Result<(), PathError> {
-        let fits = fov_y > 0.0 && fov_y < std::f64::consts::PI;
-        if fits {
-            Ok(())
-        } else {
-            Err(self.header_out_of_range("fov", value, "above 0 and below 180 degrees"))
-        }
+        let wrong = |_| self.header_out_of_range("fov", value, "above 0 and below 180 degrees");
+        check_fov(fov_y).map(drop).map_err(wrong)
     }
 
     fn check_aspect(self, aspect: f64, value: &str) -> Result<(), PathError> {
-        let fits = aspect > 0.0 && aspect.is_finite();
-        if fits { Ok(()) } else { Err(self.header_out_of_range("aspect", value, "a finite number above 0")) }
+        let wrong = |_| self.header_out_of_range("aspect", value, "a finite number above 0");
+        check_aspect(aspect).map(drop).map_err(wrong)
+    }
+
+    fn camera<T>(self, checked: Result<T, ViewError>) -> Result<T, PathError> {
+        checked.map_err(|source| PathError::Camera { file: self.file.to_owned(), line: self.line, source })
     }
 
     fn header_out_of_range(self, key: &'static str, value: &str, range: &'static str) -> PathError {
@@ -286,7 +298,8 @@ impl Line<'_> {
             let columns = numbers.len();
             return Err(PathError::Columns { file: self.file.to_owned(), line: self.line, columns });
         };
-        Ok(Pose { time, position: DVec3::new(x, y, z), orientation: self.rotation([qx, qy, qz, qw])? })
+        let position = self.camera(check_eye(DVec3::new(x, y, z)))?;
+        Ok(Pose { time, position, orientation: self.rotation([qx, qy, qz, qw])? })
     }
 
     pub fn rotation(self, value: [f64; 4]) -> Result<DQuat, PathError> {
@@ -295,7 +308,7 @@ impl Line<'_> {
         if !(1e-24..1e24).contains(&squared) {
             return Err(PathError::Rotation { file: self.file.to_owned(), line: self.line, value });
         }
-        Ok(if (squared - 1.0).abs() <= 2e-6 { quaternion } else { quaternion.normalize() })
+        Ok(check_orientation(quaternion).unwrap_or_else(|_| quaternion.normalize()))
     }
 
     pub fn check_time(self, time: f64, previous: f64) -> Result<(), PathError> {

@@ -168,11 +168,15 @@ fn of_text(
         }
         (frames, recorded.units)
     };
-    Ok(Path {
+    let path = Path {
         name: file.file_stem().map_or_else(String::new, |stem| stem.to_string_lossy().into_owned()),
         units: units.unwrap_or_else(|| "units".to_owned()),
         fov_y: recorded.fov_y.unwrap_or(60f64.to_radians()),
         aspect: recorded.aspect.unwrap_or(16.0 / 9.0),
         frames,
-    })
+    };
+    for frame in 0..path.frames.len() {
+        path.camera(frame).map_err(|source| ImportError::Camera { file: file.to_owned(), frame, source })?;
+    }
+    Ok(path)
 }

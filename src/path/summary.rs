@@ -41,7 +41,7 @@ impl Path {
     /// The motion of each step; one fewer than there are frames.
     pub fn steps(&self) -> impl Iterator<Item = Motion> + '_ {
         (1..self.frames.len()).map(|frame| {
-            let (before, after) = (self.camera(frame - 1), self.camera(frame));
+            let (before, after) = (&self.frames[frame - 1], &self.frames[frame]);
             Motion {
                 rho: before.position.distance(after.position),
                 omega: angle(before.direction(), after.direction()),
@@ -99,10 +99,11 @@ impl Path {
 /// Angle between unit vectors, exact down to the smallest pans: for an angle a, |u - v| = 2 sin(a/2) and
 /// |u + v| = 2 cos(a/2). The arc cosine of u.v would be 0 for all turns below 1e-8.
 fn angle(u: DVec3, v: DVec3) -> f64 {
-    2.0 * (u - v).length().atan2((u + v).length())
+    2.0 * libm::atan2((u - v).length(), (u + v).length())
 }
 
 #[cfg(test)]
+#[expect(clippy::disallowed_methods, reason = "random motion")]
 mod tests {
     use glam::DQuat;
 

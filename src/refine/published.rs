@@ -109,8 +109,8 @@ fn frames_passed(frame: &Frame, before: &[View]) -> u64 {
         return HORIZON;
     }
     for (b, a) in before.iter().zip(frame.views) {
-        let moved = a.eye.distance(b.eye) / frame.speed.rho;
-        let turned = a.direction.dot(b.direction).clamp(-1.0, 1.0).acos() / frame.speed.omega;
+        let moved = a.eye().distance(b.eye()) / frame.speed.rho;
+        let turned = libm::acos(a.direction().dot(b.direction()).clamp(-1.0, 1.0)) / frame.speed.omega;
         for ratio in [moved, turned] {
             if ratio > frames {
                 frames = ratio.ceil();
@@ -129,13 +129,13 @@ fn frames_until(frame: &Frame, kind: Kind, bounds: &Bounds) -> f64 {
 }
 
 fn frames_until_for(frame: &Frame, view: &View, kind: Kind, bounds: &Bounds) -> f64 {
-    let to_center = DVec3::from(bounds.center.map(f64::from)) - view.eye;
+    let to_center = DVec3::from(bounds.center.map(f64::from)) - view.eye();
     let distance = to_center.length();
     let radius = f64::from(bounds.radius);
-    let reach = frame.criterion.reach_distance(bounds, view.k);
-    let phi = (radius / distance).min(1.0).asin();
-    let alpha = (view.direction.dot(to_center) / distance).clamp(-1.0, 1.0).acos();
-    let beta = view.sin_beta.atan2(view.cos_beta);
+    let reach = frame.criterion.reach_distance(bounds, view.k());
+    let phi = libm::asin((radius / distance).min(1.0));
+    let alpha = libm::acos((view.direction().dot(to_center) / distance).clamp(-1.0, 1.0));
+    let beta = libm::atan2(view.sin_beta(), view.cos_beta());
     let (rho, omega) = (frame.speed.rho, frame.speed.omega);
     match kind {
         Kind::Unfold => {

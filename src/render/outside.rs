@@ -2,7 +2,7 @@
 
 use glam::{DMat3, DQuat, DVec3};
 
-use crate::view::Camera;
+use crate::view::{Camera, ViewError};
 
 /// Full vertical field of view of the outside camera, in radians.
 const FOV_Y: f64 = 0.6;
@@ -20,8 +20,16 @@ type Bounds = ([f32; 3], [f32; 3]);
 
 /// A bird's-eye view of a mesh and of the pyramid that `view` sees: from behind and above, a little to the side. It
 /// is upright with respect to the coordinate axis that is nearest to the camera's [`up`](Camera::up).
-#[must_use]
-pub fn outside_camera(view: &Camera, bounds: Bounds) -> Camera {
+///
+/// # Errors
+/// Where the bounds leave no place to stand.
+pub fn outside_camera(view: &Camera, bounds: Bounds) -> Result<Camera, ViewError> {
+    let camera = outside(view, bounds);
+    Camera::new(camera.position(), camera.orientation(), camera.fov_y(), camera.aspect())
+}
+
+/// The same for a picture, which takes what comes.
+pub(super) fn outside(view: &Camera, bounds: Bounds) -> Camera {
     let up = nearest_axis(view.up());
     // Looking straight up or down, the top of the image shows where ahead is.
     let level = |v: DVec3| v - up * v.dot(up);
@@ -36,12 +44,8 @@ pub fn outside_camera(view: &Camera, bounds: Bounds) -> Camera {
     let axes = DMat3::from_cols(right, right.cross(direction), -direction);
     let pyramid = Pyramid::new(view, bounds);
     let points = box_corners(bounds).into_iter().chain([pyramid.apex]).chain(pyramid.far);
-    Camera {
-        position: nearest_eye(points, &axes, FOV_Y, view.aspect),
-        orientation: DQuat::from_mat3(&axes),
-        fov_y: FOV_Y,
-        aspect: view.aspect,
-    }
+    let eye = nearest_eye(points, &axes, FOV_Y, view.aspect());
+    Camera::unchecked(eye, DQuat::from_mat3(&axes), FOV_Y, view.aspect())
 }
 
 /// The place, for a camera with these axes (right, up, backwards), from which it just sees all points.
@@ -79,14 +83,14 @@ impl Pyramid {
         let direction = view.direction();
         let center = corners.iter().sum::<DVec3>() / 8.0;
         let extent = corners[0].distance(corners[7]);
-        let depth = |p: DVec3| direction.dot(p - view.position);
+        let depth = |p: DVec3| direction.dot(p - view.position());
         // It ends in the middle of a mesh seen from afar, and well within one seen from inside, or it would dwarf it.
         let furthest = corners.into_iter().map(depth).fold(0.0, f64::max);
         let length = furthest.min(depth(center).max(FROM_INSIDE * extent)).max(SHORTEST * extent);
-        let half_height = (0.5 * view.fov_y).tan() * length;
-        let (x, y) = (view.right() * half_height * view.aspect, view.up() * half_height);
-        let middle = view.position + direction * length;
-        Self { apex: view.position, far: [middle - x - y, middle + x - y, middle + x + y, middle - x + y] }
+        let half_height = (0.5 * view.fov_y()).tan() * length;
+        let (x, y) = (view.right() * half_height * view.aspect(), view.up() * half_height);
+        let middle = view.position() + direction * length;
+        Self { apex: view.position(), far: [middle - x - y, middle + x - y, middle + x + y, middle - x + y] }
     }
 
     pub(super) fn sides(&self) -> [[DVec3; 3]; 4] {
@@ -126,8 +130,8 @@ mod tests {
             (DVec3::new(0.0, 40.0, 0.0), DQuat::from_rotation_x(-std::f64::consts::FRAC_PI_2)),
             (DVec3::new(-5.0, 1.0, 2.0), DQuat::from_rotation_z(1.0)),
         ] {
-            let view = Camera { position, orientation, fov_y: 0.8, aspect: 1.5 };
-            let camera = outside_camera(&view, bounds);
+            let view = Camera::new(position, orientation, 0.8, 1.5).unwrap();
+            let camera = outside_camera(&view, bounds).unwrap();
             let pyramid = Pyramid::new(&view, bounds);
             let points = [&box_corners(bounds)[..], &[pyramid.apex], &pyramid.far].concat();
             let seen = Frustum::new(&camera, 1e-3, 1.0);

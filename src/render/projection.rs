@@ -47,15 +47,15 @@ impl Projection {
         let near = near.max(f64::MIN_POSITIVE);
         let width = style.width.clamp(1, LARGEST);
         // A conversion from float to integer saturates, and makes 0 of what is not a number.
-        let height = ((f64::from(width) / camera.aspect).round() as u32).clamp(1, LARGEST);
-        let half_height = (0.5 * camera.fov_y).tan();
+        let height = ((f64::from(width) / camera.aspect()).round() as u32).clamp(1, LARGEST);
+        let half_height = (0.5 * camera.fov_y()).tan();
         Self {
             width,
             height,
             camera: *camera,
             axes: [camera.right(), camera.up(), -camera.direction()],
             scale: [
-                0.5 * f64::from(width * SAMPLES) / (half_height * camera.aspect),
+                0.5 * f64::from(width * SAMPLES) / (half_height * camera.aspect()),
                 0.5 * f64::from(height * SAMPLES) / half_height,
             ],
             near,
@@ -64,7 +64,7 @@ impl Projection {
     }
 
     pub(super) fn eye(&self) -> DVec3 {
-        self.camera.position
+        self.camera.position()
     }
 
     /// Turns a vector from camera space to object space.

@@ -4,7 +4,7 @@ use glam::{DQuat, dvec3};
 /// At the origin, looking along -z; at depth 1 the image spans -1 to 1.
 fn camera() -> Camera {
     let fov_y = std::f64::consts::FRAC_PI_2;
-    Camera { position: DVec3::ZERO, orientation: DQuat::IDENTITY, fov_y, aspect: 1.0 }
+    Camera::new(DVec3::ZERO, DQuat::IDENTITY, fov_y, 1.0).unwrap()
 }
 
 const PLAIN: Style = Style { width: 64, shading: Shading::Flat, wires: false };
@@ -130,13 +130,15 @@ fn from_outside_the_part_in_view_is_tinted() {
 #[test]
 fn impossible_cameras_and_sizes_do_no_harm() {
     let mesh = square(0.5, 1.0);
-    for camera in [
-        Camera { aspect: f64::NAN, ..camera() },
-        Camera { aspect: 0.0, ..camera() },
-        Camera { position: DVec3::NAN, ..camera() },
-        Camera { position: dvec3(0.0, 0.0, -1.0), ..camera() },
-        Camera { fov_y: 0.0, ..camera() },
+    let fov_y = camera().fov_y();
+    for (position, fov_y, aspect) in [
+        (DVec3::ZERO, fov_y, f64::NAN),
+        (DVec3::ZERO, fov_y, 0.0),
+        (DVec3::NAN, fov_y, 1.0),
+        (dvec3(0.0, 0.0, -1.0), fov_y, 1.0),
+        (DVec3::ZERO, 0.0, 1.0),
     ] {
+        let camera = Camera::unchecked(position, DQuat::IDENTITY, fov_y, aspect);
         for width in [0, 16] {
             let image = render(&mesh, &camera, &Style { width, ..WIRED });
             assert_eq!(image.rgb.len() as u32, 3 * image.width * image.height);

@@ -82,18 +82,20 @@ fn a_bad_path_is_named_with_the_line_in_it() {
     place.write("short.path", format!("{header}0 0 0 4 0 0 0 1\n0.1 0 0 3\n"));
     place.write("word.path", PATH.replace("0.2 0 0 2", "0.2 0 x 2"));
     place.write("infinite.path", PATH.replace("0.2 0 0 2", "0.2 0 inf 2"));
+    place.write("far.path", PATH.replace("0.2 0 0 2", "0.2 0 -1e200 2"));
     place.write("back.path", PATH.replace("0.2 ", "0.1 "));
     place.write("rotation.path", PATH.replace("0.1 0 0 3 0 0 0 1", "0.1 0 0 3 0 0 0 0"));
     place.write("fov.path", PATH.replace("fov 60", "fov 180"));
     place.write("nofov.path", PATH.replace("fov", "lens"));
     place.write("bytes.path", b"\xff\xfe\x00");
-    let cases: [(&str, &[&str]); 11] = [
+    let cases: [(&str, &[&str]); 12] = [
         ("missing.path", &["missing.path: No such file"]),
         ("folder.path", &["folder.path: "]),
         ("none.path", &["none.path: there are no frames"]),
         ("short.path", &["short.path:7: ", "8 columns", "not 4"]),
         ("word.path", &["word.path:8: \"x\""]),
         ("infinite.path", &["infinite.path:8: \"inf\""]),
+        ("far.path", &["far.path:8: the eye [0.0, -1e200, 2.0] is not finite, or farther away than 1e150"]),
         ("back.path", &["back.path:8: ", "0.1"]),
         ("rotation.path", &["rotation.path:7: "]),
         ("fov.path", &["fov.path:4: fov \"180\""]),
@@ -167,6 +169,37 @@ fn a_command_that_is_not_understood_has_exit_code_2() {
     for (arguments, said) in cases {
         place.fail(arguments, 2, said);
     }
+}
+
+/// What a tolerance means depends on the lens: too small a one has no finite `k`.
+#[test]
+fn a_tolerance_that_is_none_for_the_lens_has_exit_code_2() {
+    let place = with_earlier_outputs();
+    let takers = [
+        "compare grid.ply TOLERANCE --path descent.path --out results",
+        "compare grid.ply TOLERANCE --out results",
+        "compare scene:laserscan TOLERANCE --out results",
+        "export grid.ply TOLERANCE --path descent.path --frame 0 -o out.ply",
+        "render grid.ply TOLERANCE --path descent.path --frame 0 -o out.png",
+        "deviation grid.ply TOLERANCE --path descent.path --frames 0,1",
+    ];
+    for taker in takers {
+        for (tolerance, said) in [
+            (
+                "--theta 1e-320",
+                &["--theta 1e-320: the tolerance", "too small for a field of view of 1.047"][..],
+            ),
+            ("--pixels 1e-306", &["--pixels 1e-306: the tolerance", "too small"]),
+            // Less than the smallest number: 0.
+            ("--pixels 5e-324", &["--pixels 5e-324: the tolerance 0 is not a finite number above 0"]),
+            ("--pixels 1e308", &["--pixels 1e308: the tolerance inf is not a finite number above 0"]),
+        ] {
+            place.fail(&taker.replace("TOLERANCE", tolerance), 2, said);
+        }
+    }
+    place.succeed("export grid.ply --path descent.path --frame 0 -o new.ply --pixels 1e-6");
+    place.succeed("compare grid.ply --path descent.path --pixels 1e-6 --check --out new");
+    place.succeed("compare grid.ply --path descent.path --theta 1e-307 --check --out new");
 }
 
 #[test]

@@ -1,4 +1,5 @@
 //! What several test files share: the table of backends, real data, a generator of random logs and views.
+#![expect(clippy::disallowed_methods, reason = "random shapes and motions, or figures to compare with")]
 #![allow(dead_code)]
 
 pub mod backends;
@@ -96,28 +97,23 @@ pub fn random_view(random: &mut Random) -> View {
     let tan_half_fov: f64 = 0.5;
     let tan_beta = tan_half_fov * 2.0;
     let secant = (1.0 + tan_beta * tan_beta).sqrt();
-    View {
-        eye,
-        direction: (random.direction() - eye).normalize(),
-        cos_beta: 1.0 / secant,
-        sin_beta: tan_beta / secant,
-        k: 100.0,
-    }
+    let direction = (random.direction() - eye).normalize();
+    View::from_parts(eye, direction, 1.0 / secant, tan_beta / secant, 100.0).unwrap()
 }
 
 /// One frame of a random walk: mostly slow, sometimes at rest, fast, turning, or elsewhere altogether.
 pub fn random_step(view: &mut View, random: &mut Random) {
     match random.below(40) {
-        0 => *view = View { k: view.k, ..random_view(random) },
+        0 => *view = random_view(random).with_k(view.k()).unwrap(),
         1..=5 => {}
         6..=8 => turn(view, 0.4 * random.unit(), random),
-        9..=10 => view.eye += random.direction() * 0.5 * random.unit(),
+        9..=10 => *view = view.with_eye(view.eye() + random.direction() * 0.5 * random.unit()).unwrap(),
         _ => {
-            let ahead = view.direction + random.direction();
-            view.eye += ahead * 0.01 * random.unit();
+            let ahead = view.direction() + random.direction();
+            *view = view.with_eye(view.eye() + ahead * 0.01 * random.unit()).unwrap();
             turn(view, 0.01 * random.unit(), random);
-            if view.eye.length() > 4.0 {
-                view.eye *= 0.9;
+            if view.eye().length() > 4.0 {
+                *view = view.with_eye(view.eye() * 0.9).unwrap();
             }
         }
     }
@@ -125,7 +121,8 @@ pub fn random_step(view: &mut View, random: &mut Random) {
 
 /// Turns a view by `angle` radians about a random axis.
 pub fn turn(view: &mut View, angle: f64, random: &mut Random) {
-    let axis = view.direction.any_orthogonal_vector();
-    let axis = DQuat::from_axis_angle(view.direction, 6.0 * random.unit()) * axis.normalize();
-    view.direction = (DQuat::from_axis_angle(axis, angle) * view.direction).normalize();
+    let axis = view.direction().any_orthogonal_vector();
+    let axis = DQuat::from_axis_angle(view.direction(), 6.0 * random.unit()) * axis.normalize();
+    *view =
+        view.with_direction((DQuat::from_axis_angle(axis, angle) * view.direction()).normalize()).unwrap();
 }

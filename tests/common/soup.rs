@@ -4,6 +4,8 @@
 //! on a small integer grid or not, at any scale and far from the origin, with windings turned, triangles doubled and doubled
 //! turned over.
 
+#![expect(clippy::disallowed_methods, reason = "random shapes and motions, or figures to compare with")]
+
 use foldfront::Mesh;
 
 /// What the triangles of a soup join.

@@ -73,7 +73,7 @@ fn step(views: &mut Vec<View>, random: &mut Random) {
         random_step(view, random);
     }
     match random.below(100) {
-        0 => views.push(View { k: 40.0, ..random_view(random) }),
+        0 => views.push(random_view(random).with_k(40.0).unwrap()),
         1 if views.len() > 1 => drop(views.pop()),
         _ => {}
     }
@@ -136,7 +136,7 @@ fn what_several_parents_lead_to_is_foreseen_once() {
             let mut random = Random(seed + 300);
             let start = random_view(&mut random);
             let step = random.direction() * 0.01;
-            let at = |frame: u32| View { eye: start.eye + step * f64::from(frame), ..start };
+            let at = |frame: u32| start.with_eye(start.eye() + step * f64::from(frame)).unwrap();
             for frame in 0..80 {
                 engine.advance(&[at(frame)]).unwrap();
                 let named: BTreeMap<u32, u32> =

@@ -1,5 +1,7 @@
 //! The normal-cone test as a part of the criterion.
 
+#![expect(clippy::disallowed_methods, reason = "random shapes and motions, or figures to compare with")]
+
 use std::sync::Arc;
 
 use detail_block::{Arrangement, Io, XfmFile, XfmTree};
@@ -50,17 +52,15 @@ fn what_is_seen_from_behind_stays_coarse() {
         let strategies = [Strategy::TopDown, Strategy::Front, Strategy::Event];
         let mut engines = strategies.map(|strategy| engine(&file, ActiveMesh::new(), &log, strategy));
         let mut random = Random(21);
-        let mut view = View { k: 40_000.0, ..random_view(&mut random) };
+        let mut view = random_view(&mut random).with_k(40_000.0).unwrap();
         let (mut with, mut without, mut event_tests, mut front_tests) = (0, 0, 0, 0);
         for frame in 0..240 {
             random_step(&mut view, &mut random);
             let mut views = vec![placed(&log.mesh, view)];
             if frame / 60 % 2 == 1 {
                 // The other eye.
-                views.push(View {
-                    eye: views[0].eye + 0.02 * view.direction.any_orthogonal_vector(),
-                    ..views[0]
-                });
+                let aside = 0.02 * view.direction().any_orthogonal_vector();
+                views.push(views[0].with_eye(views[0].eye() + aside).unwrap());
             }
             let expected = cut.find(engines[0].settings(), &views);
             for engine in &mut engines {
@@ -170,7 +170,7 @@ proptest! {
         let bounds = Bounds { center: [0.1, 0.2, -0.1], radius: radius as f32, eps: eps as f32 };
         let cone = cone_of(axis, sine);
         let direction = (DVec3::new(0.1, 0.2, -0.1) - eye * 3.0 + aim * 0.5).normalize_or(DVec3::X);
-        let mut view = View { eye: eye * 3.0, direction, cos_beta: beta.cos(), sin_beta: beta.sin(), k };
+        let mut view = View::from_parts(eye * 3.0, direction, beta.cos(), beta.sin(), k).unwrap();
         let wanted = unfold(criterion, &[view], &bounds, &cone);
         let first = if wanted {
             earliest_fold(criterion, &[view], &course, &bounds, &cone)
@@ -178,10 +178,11 @@ proptest! {
             earliest_unfold(criterion, &[view], &course, &bounds, &cone)
         };
         for (frame, (astray, about, forward, steered)) in (1..).zip(steps) {
-            view.eye += heading * rho * forward + astray.clamp_length_max(1.0) * stray;
+            let moved = heading * rho * forward + astray.clamp_length_max(1.0) * stray;
+            view = view.with_eye(view.eye() + moved).unwrap();
             let turn = glam::DQuat::from_axis_angle(about.normalize(), omega * forward);
-            view.direction = (turn * view.direction).normalize();
-            view.k = (view.k + kappa * steered).max(1.0);
+            view = view.with_direction((turn * view.direction()).normalize()).unwrap();
+            view = view.with_k((view.k() + kappa * steered).max(1.0)).unwrap();
             if f64::from(frame) < first {
                 let now = unfold(criterion, &[view], &bounds, &cone);
                 prop_assert_eq!(now, wanted, "frame {} of {}", frame, first);

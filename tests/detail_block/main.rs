@@ -30,7 +30,7 @@ use glam::DVec3;
 fn placed(mesh: &Mesh, view: View) -> View {
     let (lo, hi) = mesh.bounding_box().unwrap();
     let [lo, hi] = [lo, hi].map(|p| DVec3::from(p.map(f64::from)));
-    View { eye: (lo + hi) / 2.0 + mesh.extent() / 2.0 * view.eye, ..view }
+    view.with_eye((lo + hi) / 2.0 + mesh.extent() / 2.0 * view.eye()).unwrap()
 }
 
 fn settings(mesh: &Mesh, strategy: Strategy) -> Settings {
@@ -52,13 +52,13 @@ fn flies(name: &str, log: &CollapseLog, is_manifold: bool, is_closed: bool) {
     let effective = arrangement.effective_log();
     drop(arrangement);
     let mut cut = OwnCut::new(&effective);
-    let path = around(&log.mesh);
+    let path = around(&log.mesh).unwrap();
     let tree = XfmTree::new(file, reading(Io::Blocking)).unwrap();
     let settings = settings(&log.mesh, Strategy::Event);
     let mut engine = Engine::new(tree, ActiveMesh::new(), settings).unwrap();
     let mut most = 0;
     for frame in (0..path.frames.len()).step_by(60) {
-        let view = View::new(&path.camera(frame), theta_of_pixels(1.0, 1080));
+        let view = path.view(frame, theta_of_pixels(1.0, 1080)).unwrap();
         let report = advance_settled(&mut engine, &[view]);
         let found = (report.cut_hash, report.active_nodes, report.triangles);
         assert_eq!(found, cut.find(&settings, engine.views()), "{name}, frame {frame}");
@@ -74,9 +74,9 @@ fn flies(name: &str, log: &CollapseLog, is_manifold: bool, is_closed: bool) {
     let settings = Settings { criterion: Criterion::SphereSize, ..settings };
     let tree = XfmTree::new(engine.tree().file().clone(), reading(Io::Blocking)).unwrap();
     let mut engine = Engine::new(tree, ActiveMesh::new(), settings).unwrap();
-    let ahead = View { k: 1e15, cos_beta: 0.5, sin_beta: 0.75_f64.sqrt(), ..View::new(&path.camera(0), 1.0) };
+    let ahead = path.view(0, 1.0).unwrap().with_cone(0.5, 0.75_f64.sqrt()).unwrap().with_k(1e15).unwrap();
     let views = [DVec3::X, DVec3::Y, DVec3::Z].map(|d| [d, -d]).as_flattened().to_vec();
-    let views: Vec<View> = views.iter().map(|&direction| View { direction, ..ahead }).collect();
+    let views: Vec<View> = views.iter().map(|&direction| ahead.with_direction(direction).unwrap()).collect();
     advance_settled(&mut engine, &views);
     engine.tree().assert_well_formed();
     let key = |mesh: &Mesh, corners: &[u32; 3]| {
@@ -169,7 +169,7 @@ fn forced_cuts_are_the_closure() {
         Engine::new(tree, ActiveMesh::new(), settings(&log.mesh, strategy)).unwrap()
     });
     let mut random = Random(8);
-    let mut view = View { k: 300.0, ..random_view(&mut random) };
+    let mut view = random_view(&mut random).with_k(300.0).unwrap();
     let (mut forced, mut changes) = (0, 0);
     let mut stack = Vec::new();
     for frame in 0..1500 {
@@ -220,7 +220,7 @@ fn a_bad_store_delays_and_no_more() {
         let settings = settings(&log.mesh, Strategy::Event);
         let mut engine = Engine::new(tree, ActiveMesh::new(), settings).unwrap();
         let mut random = Random(seed);
-        let mut view = View { k: 300.0, ..random_view(&mut random) };
+        let mut view = random_view(&mut random).with_k(300.0).unwrap();
         let delay = Duration::from_micros(100);
         let mut faults = 0;
         for round in 0..20 {

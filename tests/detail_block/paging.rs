@@ -9,7 +9,7 @@ use foldfront::refine::Strategy;
 use foldfront::scene::{Scene, SceneKind};
 use foldfront::vertex_tree::simulated::Simulated;
 use foldfront::vertex_tree::{NullSink, Prefetch, VertexTree};
-use foldfront::view::{View, theta_of_pixels};
+use foldfront::view::theta_of_pixels;
 
 use crate::common::backends::combinations;
 use crate::common::detail_block::{OwnCut, file, options, reading};
@@ -27,7 +27,7 @@ fn the_hard_quota_holds_over_100_000_frames() {
     let tree = XfmTree::new(file, reading(Io::Background)).unwrap();
     let mut engine = Engine::new(tree, NullSink, settings(&log.mesh, Strategy::Event)).unwrap();
     let mut random = Random(1);
-    let mut view = View { k: 300.0, ..random_view(&mut random) };
+    let mut view = random_view(&mut random).with_k(300.0).unwrap();
     let (mut misses, mut limited, mut hard) = (0, 0, 0);
     for frame in 0..100_000 {
         if frame % 10_000 == 0 {
@@ -71,7 +71,7 @@ fn what_is_removed_is_not_wanted_again_soon() {
             let mut engine = Engine::new(tree, NullSink, settings(&log.mesh, Strategy::Event)).unwrap();
             let mut beyond = 0;
             for frame in 0..path.frames.len() {
-                let view = View::new(&path.camera(frame), theta_of_pixels(1.0, 1080));
+                let view = path.view(frame, theta_of_pixels(1.0, 1080)).unwrap();
                 engine.advance(&[view]).unwrap();
                 beyond += usize::from(engine.tree().block_bytes().0 > soft);
             }
@@ -104,12 +104,12 @@ fn at_rest_the_cut_is_reached_or_loading_ends() {
     }
     let blocks_deep = depth.iter().max().map_or(0, |d: &u32| d.div_ceil(4));
     let mut cut = OwnCut::new(&effective);
-    let path = around(&log.mesh);
+    let path = around(&log.mesh).unwrap();
     let all = file.resident_bytes_of_all();
     let frame_time = Duration::from_millis(10);
     let (latency, bandwidth) = (Duration::from_millis(35), 400_000);
     let store = Simulated { latency, bandwidth: Some(bandwidth), depth: 1 << 20 };
-    let view = |frame: usize| View::new(&path.camera(frame), theta_of_pixels(0.5, 1080));
+    let view = |frame: usize| path.view(frame, theta_of_pixels(0.5, 1080)).unwrap();
     for (strategy, prefetch) in combinations() {
         let mut reached = Vec::new();
         // Where memory is short, what matters is the loading: one strategy is enough.
@@ -173,7 +173,7 @@ fn the_schedule_spares_misses() {
     let Some(mesh) = data::mesh("meshes/horse.ply") else { return };
     let log = data::log(mesh);
     let file = file(&Arrangement::new(&log, &options(false, true)).unwrap());
-    let path = around(&log.mesh);
+    let path = around(&log.mesh).unwrap();
     let frame_time = Duration::from_millis(10);
     let store = Simulated::with_latency(4 * frame_time);
     let run = |prefetch: Prefetch, quota: u64| {
@@ -182,7 +182,7 @@ fn the_schedule_spares_misses() {
         let mut engine = Engine::new(tree, NullSink, settings(&log.mesh, Strategy::Event)).unwrap();
         let (mut misses, mut reads, mut ahead, mut used) = (0, 0, 0, 0);
         for frame in 0..500 {
-            let view = View::new(&path.camera(frame), theta_of_pixels(1.0, 1080));
+            let view = path.view(frame, theta_of_pixels(1.0, 1080)).unwrap();
             let report = engine.advance(&[view]).unwrap();
             engine.tree_mut().pass(frame_time).unwrap();
             if frame > 60 {

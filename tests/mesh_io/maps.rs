@@ -1,5 +1,7 @@
 //! Height maps as others write them: GeoTIFF and GDAL's tags, PNG with a transparent value, tiles across 180 degrees.
 
+#![expect(clippy::disallowed_methods, reason = "random shapes and motions, or figures to compare with")]
+
 use foldfront::vertex_tree::DegreeMap;
 
 use super::heights::{flat_tile, zip};

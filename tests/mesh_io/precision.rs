@@ -1,5 +1,7 @@
 //! Coordinates that 32 bits do not hold.
 
+#![expect(clippy::disallowed_methods, reason = "random shapes and motions, or figures to compare with")]
+
 use std::sync::atomic::AtomicBool;
 
 use foldfront::simplify::{LEAST_MEMORY, Limits, Options, build_within};

@@ -4,7 +4,6 @@ use foldfront::cut::Displayed;
 use foldfront::engine::{Engine, Settings};
 use foldfront::oracle::Oracle;
 use foldfront::vertex_tree::{CollapseLog, NONE, NullSink, VertexTree};
-use foldfront::view::View;
 use meta_node::{Dependencies, MetaNodeTree};
 
 use crate::common::backends::meta_node_file;
@@ -125,7 +124,7 @@ fn dependencies_force_block_and_off() {
             let (mut flips, mut forced, mut blocked, mut differ) = (0, 0, 0, 0);
             for frame in 0..400 {
                 random_step(&mut view, &mut random);
-                let placed = View { eye: center + scale * view.eye, ..view };
+                let placed = view.with_eye(center + scale * view.eye()).unwrap();
                 let reports: Vec<_> = engines.iter_mut().map(|e| e.advance(&[placed]).unwrap()).collect();
                 oracle.cut(engines[0].settings().criterion, &[placed]);
                 let expected = match dependencies {

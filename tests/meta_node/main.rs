@@ -147,7 +147,7 @@ fn where_pages_in_use_stay_the_front_still_follows() {
         assert!(active <= wanted, "{active} of {wanted}: what is not wanted has been folded");
         coarser += usize::from(active < wanted);
         // Far away, a few nodes are enough.
-        let far = View { eye: view.eye * 1000.0, ..view };
+        let far = view.with_eye(view.eye() * 1000.0).unwrap();
         settle(&mut engine, &[far]);
         assert_eq!(oracle.compare(&engine), None);
     }

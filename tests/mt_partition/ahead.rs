@@ -1,5 +1,7 @@
 //! What fetches nodes ahead, on stores on virtual time: the same replay has the same misses.
 
+#![expect(clippy::disallowed_methods, reason = "random shapes and motions, or figures to compare with")]
+
 use std::sync::Arc;
 use std::time::Duration;
 
@@ -24,7 +26,7 @@ fn file() -> Arc<MtFile> {
 
 fn view(eye: DVec3, direction: DVec3) -> View {
     let cos_beta = 0.8_f64;
-    View { eye, direction, cos_beta, sin_beta: (1.0 - cos_beta * cos_beta).sqrt(), k: 150.0 }
+    View::from_parts(eye, direction, cos_beta, (1.0 - cos_beta * cos_beta).sqrt(), 150.0).unwrap()
 }
 
 /// Around the ball, close to it, looking ahead and down.

@@ -1,5 +1,7 @@
 //! The partitioned multi-triangulation: what is displayed, how it pages, and what it does with bad stores and bad files.
 
+#![expect(clippy::disallowed_methods, reason = "random shapes and motions, or figures to compare with")]
+
 mod ahead;
 #[path = "../common/mod.rs"]
 mod common;
@@ -58,7 +60,7 @@ struct Walk {
 impl Walk {
     fn new(seed: u64, k: f64) -> Self {
         let mut random = Random(seed);
-        Self { view: View { k, ..random_view(&mut random) }, random }
+        Self { view: random_view(&mut random).with_k(k).unwrap(), random }
     }
 
     fn step(&mut self) -> [View; 1] {
@@ -96,13 +98,8 @@ fn finest<M: MeshSink>(file: &Arc<MtFile>, mesh: M) -> Engine<MtTree, M> {
 /// See [`finest`].
 fn all_around(eye: DVec3) -> [View; 6] {
     let (cos_beta, sin_beta) = (0.5, 0.75_f64.sqrt());
-    [DVec3::X, DVec3::Y, DVec3::Z, -DVec3::X, -DVec3::Y, -DVec3::Z].map(|direction| View {
-        eye,
-        direction,
-        cos_beta,
-        sin_beta,
-        k: 1e9,
-    })
+    [DVec3::X, DVec3::Y, DVec3::Z, -DVec3::X, -DVec3::Y, -DVec3::Z]
+        .map(|direction| View::from_parts(eye, direction, cos_beta, sin_beta, 1e9).unwrap())
 }
 
 const CRITERION: Criterion = Criterion::ScreenError;

@@ -1,5 +1,7 @@
 //! Hierarchy construction: on real meshes, and on small ones made to be difficult.
 
+#![expect(clippy::disallowed_methods, reason = "random shapes and motions, or figures to compare with")]
+
 #[path = "../common/mod.rs"]
 mod common;
 mod out_of_core;
@@ -51,8 +53,8 @@ fn check(mesh: &Mesh, log: &CollapseLog, report: &Report) {
         let distance = mesh.extent() * 10_f64.powf(2.0 * random.unit() - 1.5);
         let eye = (low + high) * 0.5 + random.direction() * distance;
         let target = low + (high - low) * DVec3::new(random.unit(), random.unit(), random.unit());
-        let camera = Camera::look_at(eye, target, DVec3::Y, 1.0, 16.0 / 9.0);
-        let view = [View::new(&camera, theta_of_pixels(1.0, 1080))];
+        let camera = Camera::look_at(eye, target, DVec3::Y, 1.0, 16.0 / 9.0).unwrap();
+        let view = [View::new(&camera, theta_of_pixels(1.0, 1080)).unwrap()];
         for criterion in [Criterion::ScreenError, Criterion::SphereSize] {
             let active: Vec<bool> =
                 log.collapses.iter().map(|c| criterion.unfold(&view, &c.bounds)).collect();

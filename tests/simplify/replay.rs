@@ -1,5 +1,7 @@
 //! Replays a collapse log on its own terms and finds what it promises: nothing here shares code with the construction.
 
+#![expect(clippy::disallowed_methods, reason = "random shapes and motions, or figures to compare with")]
+
 use std::collections::BTreeSet;
 
 use foldfront::vertex_tree::NONE;

@@ -1,5 +1,7 @@
 //! Meshes that construction once did not end on, or did next to nothing for.
 
+#![expect(clippy::disallowed_methods, reason = "random shapes and motions, or figures to compare with")]
+
 use std::path::{Path, PathBuf};
 
 use foldfront::compare::{Options, Subject};
@@ -46,7 +48,7 @@ fn what_never_ended_ends() {
             store::write(backend, &file, &log, &BuildOptions::default()).unwrap();
             let mut subject = Subject::of_store(name, Store::open(&file).unwrap());
             let options = Options { check: true, theta: theta_of_pixels(30.0, 1080), ..Options::default() };
-            let path = around(&mesh);
+            let path = around(&mesh).unwrap();
             let runs = subject.replay(&path, 0..path.frames.len(), &options, &mut |_, _| ()).unwrap();
             for run in runs.iter().filter(|run| run.strategy.is_exact()) {
                 assert!(run.rows.iter().all(|row| row.wrong == Some(0)), "{name}, {}", backend.name());

@@ -4,6 +4,8 @@
 //! than [`ROUNDS`] are allowed, or [`MERGING`] where components are merged, whatever the number of triangles. Only for copies of a
 //! vertex that are merged does the number grow, from 138 rounds for 250 triangles to 428 for 4,000.
 
+#![expect(clippy::disallowed_methods, reason = "random shapes and motions, or figures to compare with")]
+
 use foldfront::Mesh;
 
 use crate::check::log_within;

@@ -118,7 +118,7 @@ fn walk<T: VertexTree>(
     views: &[View],
 ) -> Result<Vec<Facets>, Fault> {
     // Most of the steps are faster than declared, some slower: neither may make a difference.
-    let rho = views.windows(2).map(|w| w[0].eye.distance(w[1].eye)).fold(0.0, f64::max) / 8.0;
+    let rho = views.windows(2).map(|w| w[0].eye().distance(w[1].eye())).fold(0.0, f64::max) / 8.0;
     let settings = Settings { strategy, rho, ..Settings::default() };
     let tree = Settled::new(open()?);
     let mut engine = Engine::new(tree, StrictMesh::default(), settings).map_err(wrong)?;
@@ -149,8 +149,8 @@ pub fn views(mesh: &Mesh, pixels: f64) -> Vec<View> {
     let size = if mesh.extent() > 0.0 { mesh.extent() } else { 1.0_f64.max(middle.length()) };
     let from = |direction: [f64; 3], distance: f64, target: DVec3| {
         let eye = middle + DVec3::from(direction) * (distance * size);
-        let camera = Camera::look_at(eye, target, DVec3::Y, 1.0, 16.0 / 9.0);
-        View::new(&camera, theta_of_pixels(pixels, 1080))
+        let camera = Camera::look_at(eye, target, DVec3::Y, 1.0, 16.0 / 9.0).unwrap();
+        View::new(&camera, theta_of_pixels(pixels, 1080)).unwrap()
     };
     vec![
         from([0.6, 0.0, 0.8], 60.0, middle),

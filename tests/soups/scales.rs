@@ -1,5 +1,7 @@
 //! Lengths from 1e-30 to 1e30, whatever else is in the mesh.
 
+#![expect(clippy::disallowed_methods, reason = "random shapes and motions, or figures to compare with")]
+
 use foldfront::Mesh;
 
 use crate::check::log_within;

@@ -154,6 +154,7 @@ mod tests {
     }
 
     #[test]
+    #[expect(clippy::disallowed_methods, reason = "normals all around")]
     fn normals_turn_by_less_than_two_degrees() {
         for i in 0..40 {
             for j in 0..80 {

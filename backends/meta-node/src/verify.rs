@@ -189,10 +189,8 @@ impl Verifier<'_> {
 
 /// Whether a sphere is within another, up to the rounding of f32, and its error no larger.
 fn is_nested(inner: &Bounds, outer: &Bounds) -> bool {
-    let distance = (0..3)
-        .map(|axis| (f64::from(inner.center[axis]) - f64::from(outer.center[axis])).powi(2))
-        .sum::<f64>()
-        .sqrt();
+    let apart = |axis: usize| f64::from(inner.center[axis]) - f64::from(outer.center[axis]);
+    let distance = (0..3).map(apart).map(|x| x * x).sum::<f64>().sqrt();
     let slack = f64::from(outer.radius) * 1e-5;
     distance + f64::from(inner.radius) <= f64::from(outer.radius) + slack && inner.eps <= outer.eps
 }

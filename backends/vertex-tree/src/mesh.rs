@@ -41,6 +41,6 @@ impl Mesh {
     #[must_use]
     pub fn extent(&self) -> f64 {
         let Some((lo, hi)) = self.bounding_box() else { return 0.0 };
-        (0..3).map(|axis| (f64::from(hi[axis]) - f64::from(lo[axis])).powi(2)).sum::<f64>().sqrt()
+        (0..3).map(|axis| f64::from(hi[axis]) - f64::from(lo[axis])).map(|x| x * x).sum::<f64>().sqrt()
     }
 }

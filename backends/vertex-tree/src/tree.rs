@@ -102,6 +102,12 @@ pub enum TreeError {
         /// Why.
         source: std::io::Error,
     },
+    /// The [`origin`](VertexTree::origin) is no place where a camera can be.
+    #[error("the origin {origin:?} is not finite, or farther away than a camera can be")]
+    Origin {
+        /// As the tree gives it.
+        origin: [f64; 3],
+    },
     /// A page does not hold what it should.
     #[error("{file}: page at offset {offset} is damaged: {reason}")]
     Damaged {

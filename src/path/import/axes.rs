@@ -1,6 +1,6 @@
 //! What the axes of recorded bodies and worlds mean.
 
-use std::f64::consts::FRAC_PI_2;
+use std::f64::consts::FRAC_1_SQRT_2;
 
 use glam::{DMat3, DQuat, DVec3};
 
@@ -14,6 +14,9 @@ pub(super) fn look(forward: DVec3, up: DVec3) -> DQuat {
     }
     DQuat::from_mat3(&DMat3::from_cols(right, right.cross(forward), -forward)).normalize()
 }
+
+/// A quarter turn about x, from y to z.
+pub(super) const QUARTER: DQuat = DQuat::from_xyzw(FRAC_1_SQRT_2, 0.0, 0.0, FRAC_1_SQRT_2);
 
 /// From camera space to the recorded body's frame, after what the comments (in lower case) say.
 pub(super) fn camera_in_body(comments: &str) -> DQuat {
@@ -34,9 +37,9 @@ pub(super) fn camera_in_body(comments: &str) -> DQuat {
 pub(super) fn upright(comments: &str) -> DQuat {
     let says = |text: &str| comments.contains(text);
     if says("kitti") || says("y is down") {
-        DQuat::from_rotation_x(-FRAC_PI_2)
+        QUARTER.conjugate()
     } else if says("y up") {
-        DQuat::from_rotation_x(FRAC_PI_2)
+        QUARTER
     } else {
         DQuat::IDENTITY
     }

@@ -51,7 +51,7 @@ impl Plane {
                 start.longitude = longitude;
                 let metres = EARTH_RADIUS * PI / 180.0;
                 let east = longitude + start.turned - start.from;
-                let x = east * metres * start.latitude.to_radians().cos();
+                let x = east * metres * libm::cos(start.latitude.to_radians());
                 DVec3::new(x, (latitude - start.latitude) * metres, height)
             }
             Self::OfMesh(map) => {

@@ -6,6 +6,7 @@ use glam::DVec3;
 use thiserror::Error;
 
 use super::{MAX_FRAMES, MAX_RATE, PathError};
+use crate::view::ViewError;
 
 /// Why a trajectory could not be imported. Lines count from 1.
 #[derive(Debug, Error)]
@@ -136,6 +137,16 @@ pub enum ImportError {
     NoDegrees {
         /// The trajectory.
         file: PathBuf,
+    },
+    /// A frame of the path has no camera.
+    #[error("{}: frame {frame}: {source}", file.display())]
+    Camera {
+        /// The trajectory.
+        file: PathBuf,
+        /// Number of the frame in the path, from 0.
+        frame: usize,
+        /// What is wrong with the camera.
+        source: ViewError,
     },
     /// Coordinates are 1e30 or larger.
     #[error("{}: coordinates are out of range", file.display())]

@@ -41,7 +41,7 @@ pub(super) fn read<'a>(
         }
         trajectory.samples.push(sample);
     }
-    trajectory.fov_y = first.map(|lens| 2.0 * lens.atan());
+    trajectory.fov_y = first.map(|lens| 2.0 * libm::atan(lens));
     Ok(trajectory)
 }
 

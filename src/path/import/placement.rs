@@ -1,11 +1,11 @@
 //! Places a resampled trajectory over, on or around a mesh.
 
-use std::f64::consts::{FRAC_PI_2, PI};
+use std::f64::consts::PI;
 
 use glam::{DQuat, DVec2, DVec3};
 use vertex_tree::Mesh;
 
-use super::axes::look;
+use super::axes::{QUARTER, look};
 use super::envelope::Envelope;
 use super::trajectory::Sample;
 use super::{Mode, Up};
@@ -91,7 +91,7 @@ fn up_of(mesh: &Mesh, up: Option<Up>) -> Up {
 /// From z up to the axes of a mesh.
 pub(super) fn to_mesh(mesh: &Mesh, up: Option<Up>) -> DQuat {
     match up_of(mesh, up) {
-        Up::Y => DQuat::from_rotation_x(-FRAC_PI_2),
+        Up::Y => QUARTER.conjugate(),
         Up::Z => DQuat::IDENTITY,
     }
 }
@@ -236,14 +236,18 @@ fn around(samples: &[Sample], ground: &Ground) -> Vec<DVec3> {
             std::mem::swap(&mut azimuth, &mut distance);
         }
         let (azimuth, elevation) = (2.0 * PI * azimuth, (8.0 + 40.0 * part(offset.z, size.z)).to_radians());
-        let away =
-            DVec3::new(azimuth.cos() * elevation.cos(), azimuth.sin() * elevation.cos(), elevation.sin());
+        let ((sin, cos), (up, level)) = (libm::sincos(azimuth), libm::sincos(elevation));
+        let away = DVec3::new(cos * level, sin * level, up);
         ground.low.midpoint(ground.high) + (1.4 + distance) * ground.radius() * away
     };
     samples.iter().map(place).collect()
 }
 
 /// Looks at a point, with the quick part of the recorded rotation on top.
+#[expect(
+    clippy::disallowed_methods,
+    reason = "an imported path is written to a file, which is what is replayed"
+)]
 fn watching(samples: &[Sample], positions: &[DVec3], middle: DVec3, rate: f64) -> Vec<DQuat> {
     const LARGEST: f64 = 8.0 * PI / 180.0;
     let shake = shaking(samples, rate);

@@ -42,6 +42,10 @@ struct Curve<'a> {
 
 impl Curve<'_> {
     /// Position and orientation at a time between sample `i` and the next.
+    #[expect(
+        clippy::disallowed_methods,
+        reason = "an imported path is written to a file, which is what is replayed"
+    )]
     fn between(&self, i: usize, time: f64) -> (DVec3, Option<DQuat>) {
         let (a, b) = (&self.samples[i], &self.samples[i + 1]);
         let step = b.time - a.time;
@@ -72,6 +76,7 @@ impl Curve<'_> {
 }
 
 #[cfg(test)]
+#[expect(clippy::disallowed_methods, reason = "angles to compare with")]
 mod tests {
     use super::*;
 

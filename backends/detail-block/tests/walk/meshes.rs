@@ -1,5 +1,7 @@
 //! Meshes of all kinds, and logs of random collapses for them.
 
+#![expect(clippy::disallowed_methods, reason = "random shapes and motions, or figures to compare with")]
+
 use vertex_tree::{Bounds, Collapse, CollapseLog, Mesh};
 
 /// A small generator with a fixed sequence.

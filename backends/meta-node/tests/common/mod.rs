@@ -1,4 +1,5 @@
 //! What the test files share: random logs and files of meta-nodes in memory.
+#![expect(clippy::disallowed_methods, reason = "random shapes and motions, or figures to compare with")]
 #![allow(dead_code)]
 
 use std::sync::Arc;
