@@ -11,6 +11,7 @@ mod capped;
 mod changes;
 mod needs;
 mod waiting;
+mod well_formed;
 
 use std::collections::BinaryHeap;
 use std::time::{Duration, Instant};
@@ -105,7 +106,8 @@ pub struct FrameReport {
     pub select: Duration,
     /// The part of it spent on folds, unfolds and the mesh.
     pub apply: Duration,
-    /// Tests of the criterion.
+    /// Tests of the criterion, by its predicate or its time bounds: of what a strategy looked at, of what came into play, and
+    /// of what came to be watched. What is foreseen for other views is not among them.
     pub tests: u64,
     /// Nodes unfolded.
     pub unfolds: u64,
@@ -390,7 +392,7 @@ impl<T: VertexTree, M: MeshSink> Engine<T, M> {
         };
         let (misses, blocked) = (distinct(&mut self.missing), distinct(&mut self.forbidden));
         let apply = found.elapsed();
-        self.finder.settle(&frame);
+        let tests = tests + self.finder.settle(&frame);
         applied?;
         let foreseen = match self.tree.look_ahead() {
             0 => {

@@ -190,10 +190,36 @@ impl Finder {
         }
     }
 
-    /// The frame's changes have been made: whatever has come to be watched stays so.
-    pub fn settle(&mut self, frame: &Frame) {
-        if let Self::Event(s) = self {
-            s.settle(frame);
+    /// The frame's changes have been made: whatever has come to be watched stays so. Returns how many nodes were tested for
+    /// that.
+    pub fn settle(&mut self, frame: &Frame) -> u64 {
+        match self {
+            Self::TopDown(_) | Self::Front(_) => 0,
+            Self::Event(s) => s.settle(frame),
+            Self::Published(s) => s.settle(),
+        }
+    }
+
+    /// Calls `f` with everything that is watched, more than once if it is watched more than once: for tests.
+    pub fn for_each_watched(&self, front: &Front, f: &mut impl FnMut(Slot, Kind, &Bounds)) {
+        match self {
+            Self::TopDown(_) => front.for_each_watched(f),
+            Self::Front(s) => s.for_each_watched(f),
+            Self::Event(s) => s.for_each_watched(f),
+            Self::Published(s) => s.for_each_watched(front, f),
+        }
+    }
+
+    /// Checks a strategy's own lists.
+    ///
+    /// # Panics
+    /// At the first thing that is wrong.
+    #[track_caller]
+    pub fn assert_well_formed(&self) {
+        match self {
+            Self::TopDown(_) | Self::Published(_) => {}
+            Self::Front(s) => s.assert_well_formed(),
+            Self::Event(s) => s.assert_well_formed(),
         }
     }
 }

@@ -77,6 +77,7 @@ fn all_strategies_agree_with_the_oracle_and_show_its_mesh() {
             for engine in &mut engines {
                 let strategy = engine.settings().strategy;
                 let report = engine.advance(&views).unwrap();
+                engine.assert_well_formed();
                 if strategy.is_exact() {
                     let difference = oracle.compare(engine);
                     assert_eq!(difference, None, "{strategy:?}, seed {seed}, frame {frame}");
@@ -155,12 +156,14 @@ fn a_triangle_budget_is_met_and_the_cut_stays_exact() {
                     turn(&mut view, 0.002, &mut random);
                 }
                 last = engine.advance(&[view]).unwrap().triangles;
+                engine.assert_well_formed();
                 assert_eq!(oracle.compare(&engine), None, "{strategy:?}, budget {budget}, frame {frame}");
             }
             assert!(last <= budget && last > budget * 3 / 4, "{strategy:?}: {last} triangles of {budget}");
         }
         engine.set_budget(Budget::None);
         engine.advance(&[view]).unwrap();
+        engine.assert_well_formed();
         assert_eq!(engine.views(), &[view]);
         assert_eq!(oracle.compare(&engine), None);
     }
@@ -178,10 +181,12 @@ fn unfolding_everything_gives_the_input_and_folding_everything_the_base_mesh() {
     let everywhere: Vec<View> =
         (0..6).map(|i| View { direction: [1.0, -1.0][i % 2] * glam::DVec3::AXES[i / 2], ..near }).collect();
     let report = engine.advance(&everywhere).unwrap();
+    engine.assert_well_formed();
     assert_eq!(report.active_nodes, log.collapses.len() as u64);
     let all: BTreeSet<_> = (0..).zip(log.mesh.triangles.iter().copied()).collect();
     assert_eq!(shown(&engine), all);
     engine.advance(&[]).unwrap();
+    engine.assert_well_formed();
     assert_eq!(shown(&engine), base);
 }
 
@@ -195,6 +200,7 @@ fn a_renderer_that_patches_only_what_changed_has_the_same_buffers() {
     for _ in 0..500 {
         random_step(&mut view, &mut random);
         engine.advance(&[view]).unwrap();
+        engine.assert_well_formed();
         let mesh = engine.mesh_mut();
         vertices.resize(mesh.positions().len(), [0.0; 3]);
         triangles.resize(triangles.len().max(mesh.triangles().len()), [0; 3]);

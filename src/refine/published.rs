@@ -38,11 +38,13 @@ pub(crate) struct Published {
     frame: u64,
     tickets: Vec<u32>,
     due: Vec<Entry>,
+    /// Nodes that have come to be watched in this frame, and were tested for that.
+    fresh: u64,
 }
 
 impl Default for Published {
     fn default() -> Self {
-        Self { lists: vec![Vec::new(); HORIZON as usize], frame: 0, tickets: Vec::new(), due: Vec::new() }
+        Self { lists: vec![Vec::new(); HORIZON as usize], frame: 0, tickets: Vec::new(), due: Vec::new(), fresh: 0 }
     }
 }
 
@@ -71,6 +73,17 @@ impl Published {
         self.due = due;
     }
 
+    /// How many nodes have been tested as they came to be watched.
+    pub fn settle(&mut self) -> u64 {
+        std::mem::take(&mut self.fresh)
+    }
+
+    pub fn for_each_watched(&self, front: &Front, f: &mut impl FnMut(Slot, Kind, &Bounds)) {
+        let valid = |entry: &&Entry| self.tickets[entry.slot.index()] == entry.ticket;
+        let entries = self.lists.iter().flatten().filter(valid);
+        entries.for_each(|entry| f(entry.slot, entry.kind, &front.bounds(entry.slot)));
+    }
+
     fn ticket(&mut self, slot: Slot) -> &mut u32 {
         if self.tickets.len() <= slot.index() {
             self.tickets.resize(slot.index() + 1, 0);
@@ -88,6 +101,7 @@ impl Published {
 impl Watch for Published {
     fn watch(&mut self, frame: &Frame, slot: Slot, kind: Kind, bounds: Bounds) {
         let ticket = *self.ticket(slot);
+        self.fresh += 1;
         self.insert(frames_until(frame, kind, &bounds), Entry { slot, kind, ticket });
     }
 

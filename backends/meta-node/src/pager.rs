@@ -37,6 +37,7 @@ mod counts;
 mod foresight;
 mod memory;
 mod requests;
+mod well_formed;
 
 use std::collections::VecDeque;
 use std::sync::Arc;
