@@ -8,17 +8,17 @@
 //! Everything here runs on the caller's thread. A backend may have threads of its own; no call waits for them.
 
 mod capped;
+mod carried;
 mod changes;
 mod needs;
 mod waiting;
 mod well_formed;
 
-use std::collections::BinaryHeap;
 use std::time::{Duration, Instant};
 
 use vertex_tree::{MeshSink, NodeId, PageStats, TreeError, VertexTree};
 
-use self::capped::Urgent;
+pub(crate) use self::carried::Carried;
 use self::changes::{Counts, Noted, Steps};
 use self::needs::Pending;
 pub(crate) use self::waiting::Waiting;
@@ -115,7 +115,8 @@ pub struct FrameReport {
     pub folds: u64,
     /// Those of the unfolds that no view wanted: another node needed them.
     pub forced: u64,
-    /// Wanted changes left to later frames by the cap on work.
+    /// Changes left to later frames by the cap on work. With none, the cut is exact. They were wanted when they were looked at,
+    /// at most a few frames ago.
     pub carried: u64,
     /// Wanted changes that a rule of the backend's own forbade, see [`Step::Blocked`](vertex_tree::Step::Blocked).
     pub blocked: u64,
@@ -187,7 +188,7 @@ pub struct Engine<T, M> {
     folding: Vec<Noted>,
     unfolding: Vec<Noted>,
     ready: Vec<Slot>,
-    urgent: [BinaryHeap<Urgent>; 2],
+    carried: Carried,
     arrived: Vec<NodeId>,
     drawing_time: Duration,
     foresight: Foresight,
@@ -236,7 +237,7 @@ impl<T: VertexTree, M: MeshSink> Engine<T, M> {
             folding: Vec::new(),
             unfolding: Vec::new(),
             ready: Vec::new(),
-            urgent: Default::default(),
+            carried: Carried::default(),
             arrived: Vec::new(),
             drawing_time: Duration::ZERO,
             foresight: Foresight::default(),
@@ -371,6 +372,7 @@ impl<T: VertexTree, M: MeshSink> Engine<T, M> {
                 stack: &mut self.stack,
                 missing: &mut self.missing,
                 waiting: &mut self.waiting,
+                carried: &mut self.carried,
                 blocked: &mut self.blocked,
                 forbidden: &mut self.forbidden,
                 still_needed: &mut self.still_needed,
@@ -380,8 +382,7 @@ impl<T: VertexTree, M: MeshSink> Engine<T, M> {
                 counts: Counts::default(),
                 tests: 0,
             };
-            let (cap, urgent) = (self.settings.work_cap, &mut self.urgent);
-            let applied = step.carry_out(&self.flips, &mut self.arrived, cap, found, urgent);
+            let applied = step.carry_out(&self.flips, &mut self.arrived, self.settings.work_cap, found);
             (applied, step.counts, self.flips.tests + step.tests)
         });
         self.tree.update_mesh(&mut self.mesh);
@@ -402,7 +403,7 @@ impl<T: VertexTree, M: MeshSink> Engine<T, M> {
             look_ahead => {
                 let unfinished = misses > 0 || counts.carried > 0;
                 let (front, finder) = (&self.front, &self.finder);
-                let watched = Watched { front, finder, waiting: &self.waiting };
+                let watched = Watched { front, finder, waiting: &self.waiting, carried: &self.carried };
                 self.foresight.look(&mut self.tree, watched, &frame, &self.before, look_ahead, unfinished)
             }
         };

@@ -76,6 +76,12 @@ impl Frame<'_> {
         }
     }
 
+    /// How urgent a change is that is wanted, not negative: of unfolds that of most error first, of folds the least wanted.
+    pub fn urgency(&self, kind: Kind, bounds: &Bounds) -> f64 {
+        let urgency = self.criterion.urgency(self.views, bounds);
+        if kind == Kind::Fold { 1.0 - urgency.min(1.0) } else { urgency }
+    }
+
     /// [`unfold`](Self::unfold) of two nodes.
     #[inline(always)]
     pub fn unfold_both(&self, slots: [Slot; 2], bounds: [&Bounds; 2]) -> [bool; 2] {

@@ -60,7 +60,7 @@ impl<T: VertexTree, M: MeshSink, F: Watch> Steps<'_, T, M, F> {
     /// Sets a change aside that the backend has refused for want of the page of `awaited`.
     pub(super) fn wait_for(&mut self, (slot, node): Noted, kind: Kind, awaited: NodeId) {
         self.missing.push(awaited);
-        self.finder.unwatch(slot);
+        self.unwatch(slot);
         if !self.front.is_waiting(slot) {
             self.front.set_waiting(slot, true);
             self.waiting.changes.push(Change { slot, node, kind, awaited });

@@ -5,6 +5,7 @@ use vertex_tree::{Bounds, MeshSink, VertexTree};
 use super::Engine;
 use crate::front::Slot;
 use crate::queue::Kind;
+use crate::refine::Finder;
 
 impl<T: VertexTree, M: MeshSink> Engine<T, M> {
     /// Checks the whole state between two frames: the front's records, links and counts against the backend's structure; that
@@ -19,6 +20,7 @@ impl<T: VertexTree, M: MeshSink> Engine<T, M> {
     pub fn assert_well_formed(&self) {
         self.front.assert_well_formed(&self.tree);
         self.finder.assert_well_formed();
+        self.carried.assert_well_formed();
         self.assert_watched();
         self.tree.assert_well_formed();
     }
@@ -34,7 +36,14 @@ impl<T: VertexTree, M: MeshSink> Engine<T, M> {
                 wrong = Some(slot);
             }
         };
-        self.finder.for_each_watched(front, &mut watch);
+        // Who looks at everything finds what is carried too, and leaves it to the list.
+        let looks_at_everything = matches!(self.finder, Finder::TopDown(_));
+        self.finder.for_each_watched(front, &mut |slot, kind, bounds| {
+            if !(looks_at_everything && self.carried.contains(slot)) {
+                watch(slot, kind, bounds);
+            }
+        });
+        self.carried.for_each(|kind, slot| watch(slot, kind, &front.bounds(slot)));
         for (slot, kind) in self.waiting.valid(front) {
             watch(slot, kind, &front.bounds(slot));
         }
@@ -45,7 +54,10 @@ impl<T: VertexTree, M: MeshSink> Engine<T, M> {
             let record = front.record(slot);
             let expected = [record.is_boundary(), record.is_collapsible()].map(u32::from);
             let node = record.node;
-            assert_eq!(watched, expected, "{node:?} in {slot:?}: how often it is watched to unfold and to fold");
+            assert_eq!(
+                watched, expected,
+                "{node:?} in {slot:?}: how often it is watched to unfold and to fold"
+            );
         }
     }
 }

@@ -106,7 +106,12 @@ impl Pool {
         let mut free = self.free.clone();
         free.sort_unstable();
         assert!(free.windows(2).all(|two| two[0] < two[1]), "a chunk is free twice");
-        assert_eq!(1 + used + free.len(), self.chunks.len(), "chunks in buckets, and {} free ones", free.len());
+        assert_eq!(
+            1 + used + free.len(),
+            self.chunks.len(),
+            "chunks in buckets, and {} free ones",
+            free.len()
+        );
     }
 
     /// Calls `f` with every event in a bucket, the newest chunk first.

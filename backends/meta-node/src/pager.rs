@@ -37,6 +37,8 @@ mod counts;
 mod foresight;
 mod memory;
 mod requests;
+#[cfg(test)]
+mod tests;
 mod well_formed;
 
 use std::collections::VecDeque;

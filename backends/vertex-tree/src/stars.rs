@@ -175,7 +175,11 @@ impl Stars {
         let (mut far, mut many) = (0, 0);
         for (slot, (star, listed)) in self.stars.iter().zip(listed).enumerate() {
             assert_eq!(star.leaf == NONE, listed, "vertex {slot} is listed as a hole if it is one");
-            assert!(star.count == FAR || star.count as usize <= NEAR, "corners at vertex {slot}: {}", star.count);
+            assert!(
+                star.count == FAR || star.count as usize <= NEAR,
+                "corners at vertex {slot}: {}",
+                star.count
+            );
             far += usize::from(star.count == FAR);
             many += usize::from(list(star.brought).is_some());
         }
