@@ -131,9 +131,14 @@ fn a_page_that_is_flushed_has_a_second_chance() {
 #[test]
 fn the_free_list_is_in_order_of_flushing() {
     let mut pager = pager(InUse::Stays, Prefetch::None);
-    // Leaves of the tree of pages, which refer to nothing below them; by an urgent request, as nothing is fetched ahead.
-    let first = pager.file.header.pages - 4;
-    let [a, b, c, d] = [0, 1, 2, 3].map(|i| first + i);
+    // Pages that refer to none below them; by an urgent request, as nothing is fetched ahead.
+    let mut words = Vec::new();
+    let mut leaves = (pager.kept..pager.file.header.pages).filter(|&page| {
+        words.resize(pager.file.page_words(page), 0);
+        pager.file.read_page(page, &mut words).unwrap().children == 0
+    });
+    let [a, b, c, d] = [(); 4].map(|()| leaves.next().unwrap());
+    drop(leaves);
     for page in [a, b, c, d] {
         pager.count_usage(page, 1);
         pager.urge(page, super::Switch::Up);

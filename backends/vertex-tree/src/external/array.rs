@@ -256,7 +256,7 @@ mod tests {
         array.get(5 * page).unwrap();
         assert_eq!(held(&array), [1, 3, 4, 5], "page 2 has not been used since");
         array.get(6 * page).unwrap();
-        assert_eq!(held(&array), [1, 4, 5, 6], "page 3 has lost its chance, and page 4 has had none");
+        assert_eq!(held(&array), [3, 4, 5, 6], "page 1 has had its chance, and has not been used since");
     }
 
     #[test]
