@@ -13,7 +13,7 @@ use foldfront::criterion::Criterion;
 use foldfront::engine::{Engine, Settings};
 use foldfront::oracle::Oracle;
 use foldfront::refine::Strategy;
-use foldfront::vertex_tree::{NullSink, VertexTree};
+use foldfront::vertex_tree::NullSink;
 use foldfront::view::View;
 use in_memory::{Hierarchy, InMemoryTree};
 

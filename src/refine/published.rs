@@ -222,7 +222,7 @@ mod tests {
         let come = ((50.0 - reach) / 0.125).ceil();
         assert!(come > turn + 50.0);
         assert_eq!(unfold(&both, 0.125, 0.01), come);
-        assert_eq!(unfold(&both, 2.0, 0.01), turn);
+        assert_eq!(unfold(&both, 0.3, 0.01), turn);
         // Behind, where no turning brings it into view for long: until the sphere is entered.
         let behind = sphere(10.0, PI, 4.0, 100.0);
         assert_eq!(unfold(&behind, 0.5, 1e-6), 12.0);
