@@ -18,7 +18,8 @@
 //!
 //! A frame makes at least one change if one is possible: until then its cap does not count. What it comes upon meanwhile that
 //! is not wanted any more leaves the list, and what the backend refuses waits elsewhere for its page. What is done besides is bounded: an eighth of what waits, and what is new; of a
-//! cap in time no more than a half is spent on that, but for one heap and a few changes that are new. So while the views
+//! cap in time no more than a half is spent on that, but for one heap and a few changes that are new, and in the worst case,
+//! where nothing has been made when the time is up, but for what it takes to find one change that is wanted. So while the views
 //! rest, where nothing that has been made is undone, the cut is reached in no more frames than changes are left, and by a cap
 //! of `c` changes in as many as it takes to make them, `c` at a time.
 
@@ -26,7 +27,7 @@ use std::time::{Duration, Instant};
 
 use vertex_tree::{MeshSink, TreeError, VertexTree};
 
-use super::carried::A_FRAME;
+use super::carried::{A_FRAME, HEAPS, Urgent};
 use super::changes::{Noted, Steps, is_boundary, is_collapsible};
 use crate::budget::{FOLDS_OF, WorkCap};
 use crate::front::Slot;
@@ -107,16 +108,7 @@ impl<T: VertexTree, M: MeshSink, F: Watch> Steps<'_, T, M, F> {
             if heap > 0 && allowance.has_passed(0.25) {
                 break;
             }
-            let Self { front, finder, frame, tests, carried, .. } = self;
-            carried.look_anew(|kind, slot| {
-                let bounds = front.bounds(slot);
-                *tests += 1;
-                if frame.unfold(slot, &bounds) == (kind == Kind::Unfold) {
-                    return Some(frame.urgency(kind, &bounds));
-                }
-                finder.watch(frame, slot, kind, bounds);
-                None
-            });
+            self.look_anew();
         }
         loop {
             let more = [Kind::Unfold, Kind::Fold].map(|kind| self.take_in(kind));
@@ -124,6 +116,33 @@ impl<T: VertexTree, M: MeshSink, F: Watch> Steps<'_, T, M, F> {
                 break;
             }
         }
+    }
+
+    /// Looks anew at what waits on the next heap.
+    fn look_anew(&mut self) {
+        let Self { front, finder, frame, tests, carried, .. } = self;
+        carried.look_anew(|kind, slot| {
+            let bounds = front.bounds(slot);
+            *tests += 1;
+            if frame.unfold(slot, &bounds) == (kind == Kind::Unfold) {
+                return Some(frame.urgency(kind, &bounds));
+            }
+            finder.watch(frame, slot, kind, bounds);
+            None
+        });
+    }
+
+    /// One of the most urgent changes, in a hurry: after a teleport, most of what waits is not wanted any more, and the first
+    /// that is may be anywhere.
+    fn pop_in_a_hurry(&mut self, kind: Kind) -> Option<Urgent> {
+        for _ in 0..HEAPS {
+            let entry = self.carried.pop_current(kind);
+            if entry.is_some() {
+                return entry;
+            }
+            self.look_anew();
+        }
+        self.carried.pop_current(kind)
     }
 
     /// Puts some of the changes that are new where they wait. Says whether there were any.
@@ -160,7 +179,7 @@ impl<T: VertexTree, M: MeshSink, F: Watch> Steps<'_, T, M, F> {
                 Folds::Until(elapsed + most.saturating_sub(elapsed) / FOLDS_OF as u32)
             }
         };
-        self.take_turns_while(Kind::Fold, |step| match folds {
+        self.take_turns_while(Kind::Fold, allowance, |step| match folds {
             Folds::AtMost(most) => step.counts.folds < most,
             Folds::Until(end) => {
                 allowance.start.elapsed() < end || turn == FOLDS_OF - 1 && step.changes_made() == 0
@@ -174,8 +193,8 @@ impl<T: VertexTree, M: MeshSink, F: Watch> Steps<'_, T, M, F> {
                     WorkCap::Time(_) => !allowance.has_passed(1.0),
                 }
         };
-        self.take_turns_while(Kind::Unfold, is_left)?;
-        self.take_turns_while(Kind::Fold, is_left)
+        self.take_turns_while(Kind::Unfold, allowance, is_left)?;
+        self.take_turns_while(Kind::Fold, allowance, is_left)
     }
 
     fn changes_made(&self) -> u64 {
@@ -183,9 +202,16 @@ impl<T: VertexTree, M: MeshSink, F: Watch> Steps<'_, T, M, F> {
     }
 
     /// Makes the most urgent changes of a kind, and what follows from them, while something of the cap is left.
-    fn take_turns_while(&mut self, kind: Kind, is_left: impl Fn(&Self) -> bool) -> Result<(), TreeError> {
+    fn take_turns_while(
+        &mut self,
+        kind: Kind,
+        allowance: &Allowance,
+        is_left: impl Fn(&Self) -> bool,
+    ) -> Result<(), TreeError> {
         while is_left(self) {
-            let Some(entry) = self.carried.pop(kind) else {
+            let is_late = self.changes_made() == 0 && allowance.has_passed(1.0);
+            let popped = if is_late { self.pop_in_a_hurry(kind) } else { self.carried.pop(kind) };
+            let Some(entry) = popped else {
                 if self.take_in(kind) {
                     continue;
                 }
@@ -197,8 +223,7 @@ impl<T: VertexTree, M: MeshSink, F: Watch> Steps<'_, T, M, F> {
                     self.watch(slot, kind);
                     continue;
                 }
-                // Not where it is the one change that a frame makes in any case.
-                if self.carried.is_old(&entry) && self.changes_made() > 0 {
+                if self.carried.is_old(&entry) {
                     self.put(slot, kind);
                     continue;
                 }

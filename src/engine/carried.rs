@@ -171,6 +171,21 @@ impl Carried {
         }
     }
 
+    /// Takes out the most urgent of the changes of which each is the most urgent on its heap and was looked at in these views.
+    pub(super) fn pop_current(&mut self, kind: Kind) -> Option<Urgent> {
+        loop {
+            let before = self.moves[0];
+            let heaps = &mut self.line(kind).heaps;
+            let tops = heaps.iter().enumerate().filter_map(|(at, heap)| Some((*heap.peek()?, at)));
+            let (entry, at) = tops.filter(|(entry, _)| entry.ticket > before).max()?;
+            heaps[at].pop();
+            if self.is_valid(entry.slot, entry.ticket) {
+                self.take(entry.slot);
+                return Some(entry);
+            }
+        }
+    }
+
     fn is_valid(&self, slot: Slot, ticket: u64) -> bool {
         self.tickets[slot.index()] == ticket
     }
