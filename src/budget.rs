@@ -24,8 +24,10 @@ pub enum Budget {
 }
 
 /// The most that one frame may do, whatever its views ask for: for worst frames, after a teleport or while much arrives
-/// from a store. What is left over is carried to the next frames, the most urgent changes first, and the cut is exact
-/// again when nothing is left. A [`Budget`] is about the tolerance that the cut is for; this is about the way there.
+/// from a store. What is left over is carried to the next frames, the most urgent changes first, by what they were no more
+/// than eight frames ago, and the cut is exact again when nothing is left. Every frame makes at least one change if one
+/// is possible, so that a cap of 0 is one of 1. A [`Budget`] is about the tolerance that the cut is for; this is about the way
+/// there.
 #[derive(Clone, Copy, Debug, PartialEq, Default)]
 pub enum WorkCap {
     /// Every frame does all that it finds to do.
@@ -33,12 +35,12 @@ pub enum WorkCap {
     None,
     /// At most so many folds and unfolds a frame, and the unfolds that the last of them forces.
     Changes(u64),
-    /// Folds and unfolds for at most so long a frame.
+    /// Folds and unfolds, and what it takes to decide which, for at most so long a frame.
     Time(Duration),
 }
 
-/// Share of a cap that is spent on folds if there are any: what is folded late is not seen, but it adds up.
-pub(crate) const FOLDING_SHARE: f64 = 0.25;
+/// One in so many parts of a cap is spent on folds if there are any: what is folded late is not seen, but it adds up.
+pub(crate) const FOLDS_OF: u64 = 4;
 
 /// Most that the tolerance changes in a frame.
 pub const STEP: f64 = 0.03;

@@ -8,16 +8,17 @@
 //! Everything here runs on the caller's thread. A backend may have threads of its own; no call waits for them.
 
 mod capped;
+mod carried;
 mod changes;
 mod needs;
 mod waiting;
+mod well_formed;
 
-use std::collections::BinaryHeap;
 use std::time::{Duration, Instant};
 
 use vertex_tree::{MeshSink, NodeId, PageStats, TreeError, VertexTree};
 
-use self::capped::Urgent;
+pub(crate) use self::carried::Carried;
 use self::changes::{Counts, Noted, Steps};
 use self::needs::Pending;
 pub(crate) use self::waiting::Waiting;
@@ -108,7 +109,8 @@ pub struct FrameReport {
     pub select: Duration,
     /// The part of it spent on folds, unfolds and the mesh.
     pub apply: Duration,
-    /// Tests of the criterion.
+    /// Tests of the criterion, by its predicate or its time bounds: of what a strategy looked at, of what came into play, and
+    /// of what came to be watched. What is foreseen for other views is not among them.
     pub tests: u64,
     /// Nodes unfolded.
     pub unfolds: u64,
@@ -116,7 +118,8 @@ pub struct FrameReport {
     pub folds: u64,
     /// Those of the unfolds that no view wanted: another node needed them.
     pub forced: u64,
-    /// Wanted changes left to later frames by the cap on work.
+    /// Changes left to later frames by the cap on work. With none, the cut is exact. They were wanted when they were looked at,
+    /// at most a few frames ago.
     pub carried: u64,
     /// Wanted changes that a rule of the backend's own forbade, see [`Step::Blocked`](vertex_tree::Step::Blocked).
     pub blocked: u64,
@@ -188,7 +191,7 @@ pub struct Engine<T, M> {
     folding: Vec<Noted>,
     unfolding: Vec<Noted>,
     ready: Vec<Slot>,
-    urgent: [BinaryHeap<Urgent>; 2],
+    carried: Carried,
     arrived: Vec<NodeId>,
     drawing_time: Duration,
     foresight: Foresight,
@@ -239,7 +242,7 @@ impl<T: VertexTree, M: MeshSink> Engine<T, M> {
             folding: Vec::new(),
             unfolding: Vec::new(),
             ready: Vec::new(),
-            urgent: Default::default(),
+            carried: Carried::default(),
             arrived: Vec::new(),
             drawing_time: Duration::ZERO,
             foresight: Foresight::default(),
@@ -374,6 +377,7 @@ impl<T: VertexTree, M: MeshSink> Engine<T, M> {
                 stack: &mut self.stack,
                 missing: &mut self.missing,
                 waiting: &mut self.waiting,
+                carried: &mut self.carried,
                 blocked: &mut self.blocked,
                 forbidden: &mut self.forbidden,
                 still_needed: &mut self.still_needed,
@@ -383,8 +387,7 @@ impl<T: VertexTree, M: MeshSink> Engine<T, M> {
                 counts: Counts::default(),
                 tests: 0,
             };
-            let (cap, urgent) = (self.settings.work_cap, &mut self.urgent);
-            let applied = step.carry_out(&self.flips, &mut self.arrived, cap, found, urgent);
+            let applied = step.carry_out(&self.flips, &mut self.arrived, self.settings.work_cap, found);
             (applied, step.counts, self.flips.tests + step.tests)
         });
         self.tree.update_mesh(&mut self.mesh);
@@ -395,7 +398,7 @@ impl<T: VertexTree, M: MeshSink> Engine<T, M> {
         };
         let (misses, blocked) = (distinct(&mut self.missing), distinct(&mut self.forbidden));
         let apply = found.elapsed();
-        self.finder.settle(&frame);
+        let tests = tests + self.finder.settle(&frame);
         applied?;
         let foreseen = match self.tree.look_ahead() {
             0 => {
@@ -405,7 +408,7 @@ impl<T: VertexTree, M: MeshSink> Engine<T, M> {
             look_ahead => {
                 let unfinished = misses > 0 || counts.carried > 0;
                 let (front, finder) = (&self.front, &self.finder);
-                let watched = Watched { front, finder, waiting: &self.waiting };
+                let watched = Watched { front, finder, waiting: &self.waiting, carried: &self.carried };
                 self.foresight.look(&mut self.tree, watched, &frame, &self.before, look_ahead, unfinished)
             }
         };

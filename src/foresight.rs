@@ -20,7 +20,7 @@ use vertex_tree::{Bounds, NodeId, VertexTree};
 
 use self::candidates::Candidates;
 use self::trend::Trend;
-use crate::engine::Waiting;
+use crate::engine::{Carried, Waiting};
 use crate::filter::{Lenses, MOST_VIEWS};
 use crate::front::{Front, Slot};
 use crate::queue::Kind;
@@ -50,6 +50,7 @@ pub(crate) struct Watched<'a> {
     pub front: &'a Front,
     pub finder: &'a Finder,
     pub waiting: &'a Waiting,
+    pub carried: &'a Carried,
 }
 
 /// What is kept from frame to frame, above all allocations.

@@ -10,6 +10,7 @@
 //! arrays by it too, so all of them are as large as the front.
 
 mod graph;
+mod well_formed;
 
 use slab::Slab;
 use vertex_tree::{Bounds, NONE, NodeId, VertexTree, prefetch};
@@ -251,6 +252,11 @@ impl Front {
         let record = self.record(slot);
         let children = [Slot(2 * record.children), Slot(2 * record.children + 1)];
         (record.status & MANY == 0 && self.node(children[1]).0 != NONE).then_some(children)
+    }
+
+    /// One more than the largest slot.
+    pub(crate) fn slots(&self) -> usize {
+        2 * self.pairs.len()
     }
 
     /// The nodes in play in some pairs.

@@ -22,6 +22,7 @@
 //! lie anywhere in it.
 
 mod pool;
+mod well_formed;
 mod wheel;
 
 use vertex_tree::{Bounds, prefetch};

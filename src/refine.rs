@@ -76,6 +76,12 @@ impl Frame<'_> {
         }
     }
 
+    /// How urgent a change is that is wanted, not negative: of unfolds that of most error first, of folds the least wanted.
+    pub fn urgency(&self, kind: Kind, bounds: &Bounds) -> f64 {
+        let urgency = self.criterion.urgency(self.views, bounds);
+        if kind == Kind::Fold { 1.0 - urgency.min(1.0) } else { urgency }
+    }
+
     /// [`unfold`](Self::unfold) of two nodes.
     #[inline(always)]
     pub fn unfold_both(&self, slots: [Slot; 2], bounds: [&Bounds; 2]) -> [bool; 2] {
@@ -190,10 +196,36 @@ impl Finder {
         }
     }
 
-    /// The frame's changes have been made: whatever has come to be watched stays so.
-    pub fn settle(&mut self, frame: &Frame) {
-        if let Self::Event(s) = self {
-            s.settle(frame);
+    /// The frame's changes have been made: whatever has come to be watched stays so. Returns how many nodes were tested for
+    /// that.
+    pub fn settle(&mut self, frame: &Frame) -> u64 {
+        match self {
+            Self::TopDown(_) | Self::Front(_) => 0,
+            Self::Event(s) => s.settle(frame),
+            Self::Published(s) => s.settle(),
+        }
+    }
+
+    /// Calls `f` with everything that is watched, more than once if it is watched more than once: for tests.
+    pub fn for_each_watched(&self, front: &Front, f: &mut impl FnMut(Slot, Kind, &Bounds)) {
+        match self {
+            Self::TopDown(_) => front.for_each_watched(f),
+            Self::Front(s) => s.for_each_watched(f),
+            Self::Event(s) => s.for_each_watched(f),
+            Self::Published(s) => s.for_each_watched(front, f),
+        }
+    }
+
+    /// Checks a strategy's own lists.
+    ///
+    /// # Panics
+    /// At the first thing that is wrong.
+    #[track_caller]
+    pub fn assert_well_formed(&self) {
+        match self {
+            Self::TopDown(_) | Self::Published(_) => {}
+            Self::Front(s) => s.assert_well_formed(),
+            Self::Event(s) => s.assert_well_formed(),
         }
     }
 }

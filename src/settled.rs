@@ -125,6 +125,9 @@ impl<T: VertexTree> VertexTree for Settled<T> {
     fn settle(&mut self) -> Result<(), TreeError> {
         self.tree.settle()
     }
+    fn assert_well_formed(&self) {
+        self.tree.assert_well_formed();
+    }
     fn end_frame(&mut self) -> Result<PageStats, TreeError> {
         self.tree.end_frame()
     }

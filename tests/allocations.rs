@@ -5,10 +5,12 @@ mod common;
 use std::alloc::{GlobalAlloc, Layout, System};
 use std::cell::Cell;
 use std::sync::Arc;
+use std::time::Duration;
 
 use common::foreseen::Foreseen;
 use common::{Random, bumpy_grid, random_log, random_view, turn};
 use foldfront::active_mesh::ActiveMesh;
+use foldfront::budget::WorkCap;
 use foldfront::engine::{Engine, Settings};
 use foldfront::refine::Strategy;
 use foldfront::view::View;
@@ -47,14 +49,22 @@ static ALLOCATOR: Counting = Counting;
 #[test]
 fn a_path_that_has_been_walked_before_allocates_nothing() {
     let strategies = [Strategy::TopDown, Strategy::Front, Strategy::Event];
-    // With and without looking ahead.
-    for (strategy, look_ahead) in strategies.into_iter().flat_map(|strategy| [(strategy, 0), (strategy, 4)]) {
+    // With and without looking ahead, and with changes carried from frame to frame.
+    let ways = [
+        (0, WorkCap::None),
+        (4, WorkCap::None),
+        (0, WorkCap::Changes(2)),
+        (4, WorkCap::Time(Duration::ZERO)),
+    ];
+    for (strategy, (look_ahead, work_cap)) in
+        strategies.into_iter().flat_map(|strategy| ways.map(|way| (strategy, way)))
+    {
         let mut random = Random(21);
         let log = random_log(bumpy_grid(40, &mut random), &mut random);
         let tree = InMemoryTree::new(Arc::new(Hierarchy::new(&log).unwrap()));
         let tree = Foreseen::new(tree, look_ahead);
         let mesh = ActiveMesh::new();
-        let settings = Settings { strategy, rho: 0.01, omega: 0.01, ..Settings::default() };
+        let settings = Settings { strategy, work_cap, rho: 0.01, omega: 0.01, ..Settings::default() };
         let mut engine = Engine::new(tree, mesh, settings).unwrap();
         // There and back again, so that the end of one round is the start of the next.
         let mut view = random_view(&mut random);
@@ -68,20 +78,22 @@ fn a_path_that_has_been_walked_before_allocates_nothing() {
         views[150..].reverse();
         let mut walk = |rounds: usize| {
             let before = ALLOCATIONS.get();
-            let (mut changes, mut foreseen) = (0, 0);
+            let (mut changes, mut foreseen, mut carried) = (0, 0, 0);
             for view in std::iter::repeat_n(&views, rounds).flatten() {
                 let report = engine.advance(std::slice::from_ref(view)).unwrap();
                 engine.mesh_mut().clear_changes();
                 changes += report.unfolds + report.folds;
                 foreseen += report.foreseen;
+                carried += report.carried;
             }
-            (ALLOCATIONS.get() - before, changes, foreseen)
+            (ALLOCATIONS.get() - before, changes, foreseen, carried)
         };
         // Buffers grow to what the path asks for.
         let (first, ..) = walk(200);
-        let (later, changes, foreseen) = walk(20);
+        let (later, changes, foreseen, carried) = walk(20);
+        assert_eq!(carried > 300, work_cap != WorkCap::None, "{strategy:?}, {work_cap:?}: {carried} carried");
         assert_eq!(foreseen > changes / 2, look_ahead > 0, "{strategy:?}: {foreseen} foreseen of {changes}");
         assert!(first > 0 && changes > 1000, "{strategy:?}: {first} allocations, {changes} changes");
-        assert_eq!(later, 0, "{strategy:?}, {look_ahead} frames ahead");
+        assert_eq!(later, 0, "{strategy:?}, {look_ahead} frames ahead, {work_cap:?}");
     }
 }

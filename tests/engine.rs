@@ -10,12 +10,12 @@ use std::sync::Arc;
 use common::{Random, bumpy_grid, random_log, random_step, random_view, turn};
 use foldfront::CollapseLog;
 use foldfront::active_mesh::ActiveMesh;
-use foldfront::budget::{Budget, WorkCap};
+use foldfront::budget::Budget;
 use foldfront::criterion::Criterion;
-use foldfront::engine::{Engine, Limit, Settings};
+use foldfront::engine::{Engine, Settings};
 use foldfront::oracle::Oracle;
 use foldfront::refine::Strategy;
-use foldfront::vertex_tree::{NullSink, VertexTree};
+use foldfront::vertex_tree::NullSink;
 use foldfront::view::View;
 use in_memory::{Hierarchy, InMemoryTree};
 
@@ -79,6 +79,7 @@ fn all_strategies_agree_with_the_oracle_and_show_its_mesh() {
             for engine in &mut engines {
                 let strategy = engine.settings().strategy;
                 let report = engine.advance(&views).unwrap();
+                engine.assert_well_formed();
                 if strategy.is_exact() {
                     let difference = oracle.compare(engine);
                     assert_eq!(difference, None, "{strategy:?}, seed {seed}, frame {frame}");
@@ -160,12 +161,14 @@ fn a_triangle_budget_is_met_and_the_cut_stays_exact() {
                     turn(&mut view, 0.002, &mut random);
                 }
                 last = engine.advance(&[view]).unwrap().triangles;
+                engine.assert_well_formed();
                 assert_eq!(oracle.compare(&engine), None, "{strategy:?}, budget {budget}, frame {frame}");
             }
             assert!(last <= budget && last > budget * 3 / 4, "{strategy:?}: {last} triangles of {budget}");
         }
         engine.set_budget(Budget::None);
         engine.advance(&[view]).unwrap();
+        engine.assert_well_formed();
         assert_eq!(engine.views(), &[view]);
         assert_eq!(oracle.compare(&engine), None);
     }
@@ -183,10 +186,12 @@ fn unfolding_everything_gives_the_input_and_folding_everything_the_base_mesh() {
     let everywhere: Vec<View> =
         (0..6).map(|i| near.with_direction([1.0, -1.0][i % 2] * glam::DVec3::AXES[i / 2]).unwrap()).collect();
     let report = engine.advance(&everywhere).unwrap();
+    engine.assert_well_formed();
     assert_eq!(report.active_nodes, log.collapses.len() as u64);
     let all: BTreeSet<_> = (0..).zip(log.mesh.triangles.iter().copied()).collect();
     assert_eq!(shown(&engine), all);
     engine.advance(&[]).unwrap();
+    engine.assert_well_formed();
     assert_eq!(shown(&engine), base);
 }
 
@@ -200,6 +205,7 @@ fn a_renderer_that_patches_only_what_changed_has_the_same_buffers() {
     for _ in 0..500 {
         random_step(&mut view, &mut random);
         engine.advance(&[view]).unwrap();
+        engine.assert_well_formed();
         let mesh = engine.mesh_mut();
         vertices.resize(mesh.positions().len(), [0.0; 3]);
         triangles.resize(triangles.len().max(mesh.triangles().len()), [0; 3]);
@@ -219,76 +225,28 @@ fn a_renderer_that_patches_only_what_changed_has_the_same_buffers() {
     }
 }
 
-/// A cap spreads the work of a teleport over frames: most urgent first, no more than allowed, nothing lost.
+/// What the published bounds leave out is that a moving eye changes the angle at which a node is seen. While the camera only
+/// turns, no faster than declared, they miss nothing.
 #[test]
-fn capped_work_is_carried_and_ends_at_the_cut() {
-    let mut random = Random(17);
-    let log = random_log(bumpy_grid(40, &mut random), &mut random);
+fn as_published_a_pan_is_followed_exactly() {
+    let mut random = Random(12);
+    let log = random_log(bumpy_grid(30, &mut random), &mut random);
     let mut oracle = Oracle::new(&log).unwrap();
-    const CAP: u64 = 40;
-    let work_cap = WorkCap::Changes(CAP);
-    let exact = [Strategy::TopDown, Strategy::Front, Strategy::Event];
-    let mut engines = exact.map(|strategy| {
-        engine(&log, Settings { strategy, work_cap, rho: 0.01, omega: 0.01, ..Settings::default() })
-    });
-    let (mut carried, mut most) = (0, 0);
-    for _ in 0..12 {
-        // A teleport, a walk at a pace that the cap can not follow, and a rest.
+    let strategy = Strategy::EventPublished;
+    let mut engine = engine(&log, Settings { strategy, rho: 0.02, omega: 0.01, ..Settings::default() });
+    let (mut changes, mut tests) = (0, 0);
+    for _ in 0..10 {
         let mut view = random_view(&mut random);
-        for frame in 0..400 {
-            if frame < 30 {
-                view = view.with_eye(view.eye() + random.direction() * 0.02).unwrap();
-                turn(&mut view, 0.02, &mut random);
-            }
-            let reports = engines.each_mut().map(|engine| engine.advance(&[view]).unwrap());
-            let report = reports[0];
-            for other in &reports {
-                assert_eq!((other.cut_hash, other.carried), (report.cut_hash, report.carried));
-            }
-            assert!(report.unfolds + report.folds <= CAP, "{report:?}");
-            assert_eq!(report.limit == Limit::Work, report.carried > 0);
-            assert_eq!(report.carried == 0, oracle.compare(&engines[0]).is_none(), "frame {frame}");
-            if report.carried > 0 {
-                assert_eq!(
-                    report.unfolds + report.folds,
-                    CAP,
-                    "work is left, and so is room for it: {report:?}"
-                );
-            }
-            (carried, most) = (carried + report.carried, most.max(report.carried));
+        // No view at all, so that the first one is compared with none.
+        engine.advance(&[]).unwrap();
+        for frame in 0..300 {
+            let report = engine.advance(&[view]).unwrap();
+            engine.assert_well_formed();
+            assert_eq!(oracle.compare(&engine), None, "frame {frame}");
+            turn(&mut view, 0.0099, &mut random);
+            (changes, tests) = (changes + report.unfolds + report.folds, tests + report.tests);
         }
-        assert!(engines.iter().all(|engine| oracle.compare(engine).is_none()), "something was lost");
-        // At rest, and with nothing left, nothing is tested.
-        assert_eq!(engines[2].advance(&[view]).unwrap().tests, 0);
     }
-    assert!(carried > 5000 && most > 5 * CAP, "{carried} carried, at most {most}");
-}
-
-#[test]
-fn the_most_urgent_changes_are_made_first() {
-    let mut random = Random(18);
-    let log = random_log(bumpy_grid(40, &mut random), &mut random);
-    let view = random_view(&mut random);
-    let work_cap = WorkCap::Changes(50);
-    let mut engine = engine(&log, Settings { work_cap, ..Settings::default() });
-    let urgency = |engine: &Engine<InMemoryTree, ActiveMesh>, node| {
-        let bounds = log.collapses[engine.tree().log_number(node) as usize].bounds;
-        Criterion::ScreenError.urgency(&[view], &bounds)
-    };
-    let mut ends = 0;
-    while engine.advance(&[view]).unwrap().carried > 0 {
-        // Whatever could have been unfolded instead was less urgent than what was.
-        let mut active = BTreeSet::new();
-        engine.for_each_active(|node| {
-            active.insert(node);
-        });
-        let tree = engine.tree();
-        let least = active.iter().map(|&node| urgency(&engine, node)).fold(f64::INFINITY, f64::min);
-        let below = active.iter().flat_map(|&node| tree.children(node));
-        let boundary = below.chain(tree.roots().iter().copied()).filter(|node| !active.contains(node));
-        let waiting = boundary.map(|node| urgency(&engine, node)).fold(0.0, f64::max);
-        assert!(least >= 1.0 && waiting <= least * 1.000_001, "{waiting} waits, {least} does not");
-        ends += 1;
-    }
-    assert!(ends > 5, "{ends} frames with something left");
+    assert!(changes > 2000, "{changes} changes");
+    assert!(tests < 3000 * log.collapses.len() as u64 / 4, "{tests} tests");
 }

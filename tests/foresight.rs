@@ -67,6 +67,7 @@ fn a_steady_camera_is_foreseen_exactly() {
             let (mut right, mut wrong) = (0, 0);
             for frame in 0..60 {
                 engine.advance(&[at(frame)]).unwrap();
+                engine.assert_well_formed();
                 if frame < 3 {
                     continue;
                 }
@@ -114,6 +115,7 @@ fn nothing_is_named_that_can_not_be_due() {
             }
             let all = engines.each_mut().map(|engine| {
                 engine.advance(&views).unwrap();
+                engine.assert_well_formed();
                 named(engine)
             });
             assert_eq!(all[0], all[1], "seed {seed}, frame {frame}: top-down and front");
@@ -164,6 +166,7 @@ fn nothing_is_foreseen_without_need() {
         assert!(foreseen > 20, "{}: {foreseen}", strategy.name());
         for rest in 0..5 {
             let report = engine.advance(&[view]).unwrap();
+            engine.assert_well_formed();
             assert_eq!((report.foreseen, engine.tree().named.len()), (0, 0), "{}, {rest}", strategy.name());
         }
         engine.tree_mut().look_ahead = 0;

@@ -4,13 +4,14 @@
 
 use std::collections::BTreeMap;
 use std::collections::btree_map::Entry;
+use std::f64::consts::PI;
 
 use foldfront::Bounds;
 use foldfront::criterion::Criterion;
 use foldfront::front::Slot;
 use foldfront::motion::{Course, Motion, Odometer};
 use foldfront::queue::{DUE, Event, EventQueue, HORIZON, Kind, TICKS_PER_FRAME};
-use foldfront::view::View;
+use foldfront::view::{Camera, View};
 use glam::DVec3;
 use proptest::prelude::*;
 
@@ -232,6 +233,115 @@ proptest! {
             }
         }
     }
+}
+
+/// At the origin, looking along x.
+fn looking_along_x() -> View {
+    View::new(&Camera::look_at(DVec3::ZERO, DVec3::X, DVec3::Z, 1.0, 1.0), 0.01)
+}
+
+/// A sphere at a distance, at an angle from the x axis.
+fn sphere(distance: f64, angle: f64, radius: f32, eps: f32) -> Bounds {
+    let center = DVec3::new(distance * angle.cos(), distance * angle.sin(), 0.0);
+    Bounds { center: center.as_vec3().to_array(), radius, eps }
+}
+
+fn still() -> Course {
+    Course { heading: DVec3::ZERO, rho: 0.0, stray: 0.0, omega: 0.0, kappa: 0.0 }
+}
+
+#[track_caller]
+fn assert_about(found: f64, expected: f64, what: &str) {
+    assert!((found / expected - 1.0).abs() < 1e-6, "{what}: {found}, not {expected}");
+}
+
+/// A bound that said nothing would never miss. Each of them says all that the camera's motion leaves: the time until the
+/// node comes into view (`t_r`) and until it is coarse (`t_m`), of which the later counts.
+#[test]
+fn a_bound_on_unfolding_is_the_later_of_two_times() {
+    let view = looking_along_x();
+    let beta = view.sin_beta.atan2(view.cos_beta);
+    let earliest =
+        |bounds: &Bounds, course: Course| Criterion::ScreenError.earliest_unfold(&[view], &course, bounds);
+    let reach = |bounds: &Bounds| Criterion::ScreenError.reach_distance(bounds, view.k);
+    // In view, and so far away that it is fine.
+    let far = sphere(100.0, 0.0, 2.0, 0.1);
+    let gap = 100.0 - reach(&far);
+    assert_about(earliest(&far, Course { stray: 0.5, ..still() }), gap / 0.5, "any way");
+    let ahead = Course { heading: DVec3::X, rho: 0.5, ..still() };
+    assert_about(earliest(&far, ahead), gap / 0.5, "straight at it");
+    assert_eq!(earliest(&far, Course { heading: -DVec3::X, ..ahead }), f64::INFINITY, "away from it");
+    let aside = Course { heading: DVec3::new(0.6, 0.8, 0.0), ..ahead };
+    assert_about(earliest(&far, aside), gap / (0.5 * 0.6), "past it");
+    let slope = f64::from(far.eps);
+    assert_about(
+        earliest(&far, Course { kappa: 2.0, ..still() }),
+        gap / (2.0 * slope),
+        "the tolerance changes",
+    );
+    assert_about(earliest(&far, Course { kappa: 2.0, ..ahead }), gap / (0.5 + 2.0 * slope), "both");
+    // Coarse, and out of view to the side.
+    let beside = sphere(100.0, beta + 0.3, 2.0, 10.0);
+    let gap = 100.0 * 0.3_f64.sin() - 2.0;
+    assert_about(earliest(&beside, Course { omega: 0.01, ..still() }), gap / (0.01 * 100.0), "turning");
+    assert_about(earliest(&beside, Course { stray: 0.5, ..still() }), gap / 0.5, "moving");
+    assert_about(
+        earliest(&beside, Course { omega: 0.01, stray: 0.5, ..still() }),
+        gap / 1.5,
+        "turning and moving",
+    );
+    assert_eq!(earliest(&beside, still()), f64::INFINITY);
+    // Behind the eye the nearest point of the cone is the eye.
+    let behind = sphere(100.0, PI, 2.0, 10.0);
+    assert_about(
+        earliest(&behind, Course { stray: 0.5, ..still() }),
+        98.0 / 0.5,
+        "from behind, into the sphere",
+    );
+    // Neither: one comes sooner, the other later.
+    let neither = sphere(100.0, beta + 0.3, 2.0, 0.1);
+    let course = Course { omega: 0.01, stray: 0.01, ..still() };
+    assert_about(earliest(&neither, course), (100.0 - reach(&neither)) / 0.01, "coarse last");
+    let course = Course { heading: DVec3::X, omega: 0.001, kappa: 1000.0, ..still() };
+    assert_about(earliest(&neither, course), gap / 0.1, "in view last");
+}
+
+/// The dual, and `t_i`, the time until a sphere is left: folded is what is left and out of view or fine.
+#[test]
+fn a_bound_on_folding_is_the_later_of_leaving_and_the_first_of_two_times() {
+    let view = looking_along_x();
+    let beta = view.sin_beta.atan2(view.cos_beta);
+    let earliest =
+        |bounds: &Bounds, course: Course| Criterion::ScreenError.earliest_fold(&[view], &course, bounds);
+    let reach = |bounds: &Bounds| Criterion::ScreenError.reach_distance(bounds, view.k);
+    // In view, out to its far edge.
+    let inside = sphere(100.0, beta - 0.1, 2.0, 10.0);
+    let room = 100.0 * 0.1_f64.sin() + 2.0;
+    assert_about(earliest(&inside, Course { omega: 0.01, ..still() }), room / (0.01 * 100.0), "turning");
+    assert_about(earliest(&inside, Course { stray: 0.5, ..still() }), room / 0.5, "moving");
+    // In the middle of the view, and coarse.
+    let coarse = sphere(10.0, 0.0, 2.0, 0.05);
+    let room = reach(&coarse) - 10.0;
+    let away = Course { heading: -DVec3::X, rho: 0.01, omega: 1e-9, ..still() };
+    let found = earliest(&coarse, away);
+    assert!((0.9..=1.0).contains(&(found * 0.01 / room)), "{found}, at most {}", room / 0.01);
+    let slope = f64::from(coarse.eps);
+    let found = earliest(&coarse, Course { kappa: 2.0, ..still() });
+    assert_about(found, room / (2.0 * slope), "the tolerance changes");
+    // Of the two, the first.
+    let both = Course { omega: 0.01, kappa: 1e-3, ..still() };
+    assert_about(earliest(&inside, both), (100.0 * 0.1_f64.sin() + 2.0) / 1.0, "out of view first");
+    let both = Course { omega: 1e-6, kappa: 100.0, ..still() };
+    assert_about(earliest(&inside, both), (reach(&inside) - 100.0) / 1000.0, "fine first");
+    // The eye is in the sphere, which is out of view as soon as it is left: not before.
+    let around = sphere(1.0, PI, 4.0, 10.0);
+    assert_about(earliest(&around, Course { stray: 0.25, ..still() }), 3.0 / 0.25, "until it is left");
+    assert_about(
+        earliest(&around, Course { stray: 0.25, omega: 1.0, ..still() }),
+        3.0 / 0.25,
+        "turning does not help",
+    );
+    assert_eq!(earliest(&around, Course { omega: 1.0, kappa: 100.0, ..still() }), f64::INFINITY);
 }
 
 /// A small generator for motions; what matters is that they are varied and go straight for the marks.

@@ -105,6 +105,7 @@ fn a_walk_shows_what_the_log_says(name: &str, log: &CollapseLog, hierarchy: &Arc
     for frame in 0..200 {
         random_step(&mut view, &mut random);
         let report = engine.advance(&[view.with_eye(center + scale * view.eye()).unwrap()]).unwrap();
+        engine.assert_well_formed();
         most = most.max(report.triangles);
         changes += report.unfolds + report.folds;
         if frame % 20 == 19 {

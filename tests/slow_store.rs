@@ -44,7 +44,9 @@ fn settings(strategy: Strategy) -> Settings {
 
 fn play<T: VertexTree>(engine: &mut Engine<T, NullSink>, views: &[View]) -> FrameReport {
     engine.tree_mut().pass(FRAME).unwrap();
-    engine.advance(views).unwrap()
+    let report = engine.advance(views).unwrap();
+    engine.assert_well_formed();
+    report
 }
 
 /// Waits for all that is missing.

@@ -3,12 +3,11 @@
 //! Folds come first, then unfolds, each to a fixpoint: a node that comes into play in the course of this is tested at once
 //! and takes its turn at the end of its list.
 
-use std::collections::BinaryHeap;
 use std::time::Instant;
 
 use vertex_tree::{MeshSink, NodeId, Step, TreeError, VertexTree};
 
-use super::capped::Urgent;
+use super::carried::Carried;
 use super::needs::Pending;
 use super::waiting::Waiting;
 use crate::budget::WorkCap;
@@ -47,6 +46,8 @@ pub(super) struct Steps<'a, T, M, F> {
     pub missing: &'a mut Vec<NodeId>,
     /// Changes that wait for pages.
     pub waiting: &'a mut Waiting,
+    /// Changes that a cap on work has left for later.
+    pub carried: &'a mut Carried,
     /// Nodes whose change a rule of the backend's own forbade; some more than once.
     pub forbidden: &'a mut Vec<NodeId>,
     /// The same while others may yet make them possible.
@@ -71,7 +72,6 @@ impl<T: VertexTree, M: MeshSink, F: Watch> Steps<'_, T, M, F> {
         arrived: &mut Vec<NodeId>,
         cap: WorkCap,
         start: Instant,
-        urgent: &mut [BinaryHeap<Urgent>; 2],
     ) -> Result<(), TreeError> {
         self.missing.clear();
         self.blocked.clear();
@@ -81,7 +81,7 @@ impl<T: VertexTree, M: MeshSink, F: Watch> Steps<'_, T, M, F> {
         self.resume(arrived);
         let applied = match cap {
             WorkCap::None => self.apply(),
-            cap => self.apply_within(cap, start, urgent),
+            cap => self.apply_within(cap, start),
         };
         if applied.is_err() {
             self.abandon();
@@ -91,6 +91,9 @@ impl<T: VertexTree, M: MeshSink, F: Watch> Steps<'_, T, M, F> {
 
     /// Folds, then unfolds, and whatever follows.
     fn apply(&mut self) -> Result<(), TreeError> {
+        if self.carried.len() > 0 {
+            self.take_back_carried();
+        }
         self.take_turns(Kind::Fold)?;
         self.retry_blocked(Kind::Fold)?;
         self.forbid();
@@ -193,7 +196,14 @@ impl<T: VertexTree, M: MeshSink, F: Watch> Steps<'_, T, M, F> {
     }
 
     #[inline(always)]
-    fn list(&self, kind: Kind) -> &Vec<Noted> {
+    pub(super) fn list(&self, kind: Kind) -> &Vec<Noted> {
+        match kind {
+            Kind::Fold => self.folding,
+            Kind::Unfold => self.unfolding,
+        }
+    }
+
+    pub(super) fn list_mut(&mut self, kind: Kind) -> &mut Vec<Noted> {
         match kind {
             Kind::Fold => self.folding,
             Kind::Unfold => self.unfolding,
@@ -205,12 +215,18 @@ impl<T: VertexTree, M: MeshSink, F: Watch> Steps<'_, T, M, F> {
         self.frame.unfold(slot, &self.front.record(slot).bounds)
     }
 
-    fn watch(&mut self, slot: Slot, kind: Kind) {
+    pub(super) fn watch(&mut self, slot: Slot, kind: Kind) {
         self.finder.watch(self.frame, slot, kind, self.front.bounds(slot));
     }
 
-    pub(super) fn refused(&mut self, slot: Slot, kind: Kind) {
+    /// The node is no longer what it was watched as, if it was watched, nor what its change has been carried for.
+    pub(super) fn unwatch(&mut self, slot: Slot) {
         self.finder.unwatch(slot);
+        self.carried.remove(slot);
+    }
+
+    pub(super) fn refused(&mut self, slot: Slot, kind: Kind) {
+        self.unwatch(slot);
         self.finder.refused(slot, kind, self.front.bounds(slot));
     }
 
@@ -243,17 +259,23 @@ impl<T: VertexTree, M: MeshSink, F: Watch> Steps<'_, T, M, F> {
     #[inline(always)]
     fn folded(&mut self, slot: Slot) {
         self.counts.folds += 1;
+        self.carried.remove(slot);
         if T::IS_TREE {
             for child in self.front.children(self.tree, slot) {
                 self.finder.unwatch(child);
+                self.carried.remove(child);
             }
             self.finder.changed(slot);
             self.front.set_folded(self.tree, slot);
         } else {
             self.finder.changed(slot);
             self.ready.clear();
-            let finder = &mut *self.finder;
-            self.front.set_folded_in_graph(self.tree, slot, |child| finder.unwatch(child), self.ready);
+            let (finder, carried) = (&mut *self.finder, &mut *self.carried);
+            let release = |child| {
+                finder.unwatch(child);
+                carried.remove(child);
+            };
+            self.front.set_folded_in_graph(self.tree, slot, release, self.ready);
         }
         self.watch(slot, Kind::Unfold);
         let (front, frame) = (&*self.front, self.frame);
@@ -299,17 +321,23 @@ impl<T: VertexTree, M: MeshSink, F: Watch> Steps<'_, T, M, F> {
     pub(super) fn unfolded(&mut self, slot: Slot) {
         self.counts.unfolds += 1;
         self.finder.changed(slot);
+        self.carried.remove(slot);
         if T::IS_TREE {
             for parent in self.front.parents(self.tree, slot) {
                 if self.front.record(parent).is_collapsible() {
                     self.finder.unwatch(parent);
+                    self.carried.remove(parent);
                 }
             }
             self.front.set_active(self.tree, slot);
         } else {
             self.ready.clear();
-            let finder = &mut *self.finder;
-            self.front.set_active_in_graph(self.tree, slot, |parent| finder.unwatch(parent), self.ready);
+            let (finder, carried) = (&mut *self.finder, &mut *self.carried);
+            let hold = |parent| {
+                finder.unwatch(parent);
+                carried.remove(parent);
+            };
+            self.front.set_active_in_graph(self.tree, slot, hold, self.ready);
         }
         if let Some(cones) = self.frame.cones {
             for child in self.front.children(self.tree, slot) {

@@ -9,7 +9,7 @@
 use vertex_tree::{MeshSink, NodeId, VertexTree};
 
 use super::changes::{Noted, Steps};
-use crate::front::Slot;
+use crate::front::{Front, Slot};
 use crate::queue::Kind;
 use crate::refine::Watch;
 
@@ -26,6 +26,15 @@ pub(crate) struct Change {
     awaited: NodeId,
 }
 
+impl Change {
+    /// Whether the node is in its slot still, its change set aside, and not changed since.
+    #[inline(always)]
+    fn is_valid(&self, front: &Front) -> bool {
+        let record = front.record(self.slot);
+        record.node == self.node && record.is_waiting() && record.is_active() == (self.kind == Kind::Fold)
+    }
+}
+
 /// The changes that wait.
 #[derive(Default)]
 pub(crate) struct Waiting {
@@ -40,13 +49,18 @@ impl Waiting {
     pub fn changes(&self) -> &[Change] {
         &self.changes
     }
+
+    /// Those that wait still: the front knows of them.
+    pub fn valid(&self, front: &Front) -> impl Iterator<Item = (Slot, Kind)> {
+        self.changes.iter().filter(|change| change.is_valid(front)).map(|change| (change.slot, change.kind))
+    }
 }
 
 impl<T: VertexTree, M: MeshSink, F: Watch> Steps<'_, T, M, F> {
     /// Sets a change aside that the backend has refused for want of the page of `awaited`.
     pub(super) fn wait_for(&mut self, (slot, node): Noted, kind: Kind, awaited: NodeId) {
         self.missing.push(awaited);
-        self.finder.unwatch(slot);
+        self.unwatch(slot);
         if !self.front.is_waiting(slot) {
             self.front.set_waiting(slot, true);
             self.waiting.changes.push(Change { slot, node, kind, awaited });
@@ -70,7 +84,8 @@ impl<T: VertexTree, M: MeshSink, F: Watch> Steps<'_, T, M, F> {
             let change = changes[at];
             let Change { slot, node, kind, awaited } = change;
             let record = self.front.record(slot);
-            if record.node != node || !record.is_waiting() {
+            // A node that has changed meanwhile may be waiting to change back: that is another entry.
+            if !change.is_valid(self.front) {
                 given_up.push(awaited);
                 continue;
             }

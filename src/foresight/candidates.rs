@@ -50,7 +50,7 @@ impl Candidates {
     pub fn find(
         &mut self,
         ahead: &Ahead,
-        Watched { front, finder, waiting }: Watched,
+        Watched { front, finder, waiting, carried }: Watched,
         agenda: &mut [Vec<Change>; MOST_INSTANTS],
     ) {
         let Some(now) = Lenses::new(ahead.frame.criterion, ahead.frame.views) else { return };
@@ -75,6 +75,10 @@ impl Candidates {
         // What is refused now is wrong at the next instant too, if it is still in play.
         for change in waiting.changes().iter().filter(|change| front.is_waiting(change.slot)) {
             take(change.slot, change.kind, &front.bounds(change.slot));
+        }
+        // So is what is carried, which these strategies do not watch meanwhile.
+        if matches!(finder, Finder::Event(_) | Finder::Front(_)) {
+            carried.for_each(|kind, slot| take(slot, kind, &front.bounds(slot)));
         }
         match finder {
             Finder::Event(event) => {

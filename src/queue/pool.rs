@@ -97,6 +97,23 @@ impl Pool {
         }
     }
 
+    /// Checks that so many chunks are in buckets and all others free, each once.
+    ///
+    /// # Panics
+    /// If not.
+    #[track_caller]
+    pub fn assert_used(&self, used: usize) {
+        let mut free = self.free.clone();
+        free.sort_unstable();
+        assert!(free.windows(2).all(|two| two[0] < two[1]), "a chunk is free twice");
+        assert_eq!(
+            1 + used + free.len(),
+            self.chunks.len(),
+            "chunks in buckets, and {} free ones",
+            free.len()
+        );
+    }
+
     /// Calls `f` with every event in a bucket, the newest chunk first.
     pub fn read(&self, mut bucket: Bucket, mut f: impl FnMut(&Event)) {
         while bucket != 0 {

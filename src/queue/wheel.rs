@@ -126,6 +126,25 @@ impl Wheel {
             slots &= slots - 1;
         }
     }
+
+    /// Checks that a bucket that is not empty is marked, and that its turn has not been passed over.
+    ///
+    /// # Panics
+    /// If not.
+    #[track_caller]
+    pub fn assert_well_formed(&self) {
+        for (level, slots) in self.levels.iter().enumerate() {
+            let occupied = self.occupied[level];
+            assert_eq!(occupied != 0, self.in_use >> level & 1 == 1, "whether level {level} is in use");
+            for (slot, _) in slots.iter().enumerate().filter(|&(_, &bucket)| bucket != 0) {
+                assert!(occupied >> slot & 1 == 1, "slot {slot} of level {level} is not marked");
+                // The present slot of a wider level has been drained.
+                let first = (self.tick >> level) + u64::from(level > 0);
+                let number = first + (slot as u64).wrapping_sub(first) % SLOTS;
+                assert!(self.next <= number << level, "slot {slot} of level {level} is passed over");
+            }
+        }
+    }
 }
 
 /// The tick in which a time lies, in frames.

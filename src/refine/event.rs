@@ -82,7 +82,7 @@ impl EventDriven {
 
     pub fn find(&mut self, frame: &Frame, before: &[View], flips: &mut Flips) {
         // Nodes may have come to be watched outside of a frame: the roots.
-        self.settle(frame);
+        flips.tests += self.settle(frame);
         match frame.motion {
             Motion::Rest => self.queue.take_pressing(),
             Motion::Frames(_) => self.advance(frame, before),
@@ -168,11 +168,12 @@ impl EventDriven {
         }
     }
 
-    /// Schedules the nodes that have come to be watched in this frame.
-    pub fn settle(&mut self, frame: &Frame) {
+    /// Schedules the nodes that have come to be watched in this frame, and says how many they are.
+    pub fn settle(&mut self, frame: &Frame) -> u64 {
         if self.fresh.is_empty() {
-            return;
+            return 0;
         }
+        let mut tests = 0;
         let mut fresh = std::mem::take(&mut self.fresh);
         let mut left = fresh.iter();
         let next = |queue: &mut EventQueue, due: &mut [Event; LANES]| {
@@ -183,12 +184,25 @@ impl EventDriven {
                 due[count] = *event;
                 count += usize::from(queue.is_valid(event));
             }
+            tests += count as u64;
             count
         };
         // A node that no view wants is active where another needs it: its time to fold is the next motion.
         self.process(frame, next, |event, queue| queue.schedule_ticks(0, *event));
         fresh.clear();
         self.fresh = fresh;
+        tests
+    }
+
+    pub fn for_each_watched(&self, f: &mut impl FnMut(Slot, Kind, &Bounds)) {
+        let fresh = self.fresh.iter().filter(|event| self.queue.is_valid(event));
+        fresh.for_each(|event| f(event.slot, event.kind(), &event.bounds));
+        self.queue.for_each(|event| f(event.slot, event.kind(), &event.bounds));
+    }
+
+    #[track_caller]
+    pub fn assert_well_formed(&self) {
+        self.queue.assert_well_formed();
     }
 
     /// Tests the events that `next` puts into its second argument, as many as it returns, until it returns 0. Calls `flip`

@@ -34,6 +34,30 @@ impl FrontScan {
         [(&self.folded, Kind::Unfold), (&self.unfolded, Kind::Fold)]
     }
 
+    pub fn for_each_watched(&self, f: &mut impl FnMut(Slot, Kind, &Bounds)) {
+        for (packed, kind) in self.watched() {
+            for (block, used) in packed.blocks() {
+                (0..used).for_each(|lane| f(Slot(block.tag[lane]), kind, &block.bounds(lane)));
+            }
+        }
+    }
+
+    /// Checks that each entry is where its slot says, and no slot says more.
+    ///
+    /// # Panics
+    /// At the first thing that is wrong.
+    #[track_caller]
+    pub fn assert_well_formed(&self) {
+        for (packed, kind) in self.watched() {
+            for (at, slot) in (0..).zip(packed.blocks().flat_map(|(block, used)| &block.tag[..used])) {
+                let place = 2 * at + u32::from(kind == Kind::Fold) + 2;
+                assert_eq!(self.place[*slot as usize], place, "where slot {slot} is watched");
+            }
+        }
+        let places = self.place.iter().filter(|&&place| place != 0).count();
+        assert_eq!(places, self.folded.len() + self.unfolded.len(), "slots that are watched");
+    }
+
     fn put(&mut self, slot: Slot, kind: Kind, bounds: Bounds) {
         if self.place.len() <= slot.index() {
             self.place.resize(slot.index() + 1, 0);

@@ -38,11 +38,19 @@ pub(crate) struct Published {
     frame: u64,
     tickets: Vec<u32>,
     due: Vec<Entry>,
+    /// Nodes that have come to be watched in this frame, and were tested for that.
+    fresh: u64,
 }
 
 impl Default for Published {
     fn default() -> Self {
-        Self { lists: vec![Vec::new(); HORIZON as usize], frame: 0, tickets: Vec::new(), due: Vec::new() }
+        Self {
+            lists: vec![Vec::new(); HORIZON as usize],
+            frame: 0,
+            tickets: Vec::new(),
+            due: Vec::new(),
+            fresh: 0,
+        }
     }
 }
 
@@ -71,6 +79,17 @@ impl Published {
         self.due = due;
     }
 
+    /// How many nodes have been tested as they came to be watched.
+    pub fn settle(&mut self) -> u64 {
+        std::mem::take(&mut self.fresh)
+    }
+
+    pub fn for_each_watched(&self, front: &Front, f: &mut impl FnMut(Slot, Kind, &Bounds)) {
+        let valid = |entry: &&Entry| self.tickets[entry.slot.index()] == entry.ticket;
+        let entries = self.lists.iter().flatten().filter(valid);
+        entries.for_each(|entry| f(entry.slot, entry.kind, &front.bounds(entry.slot)));
+    }
+
     fn ticket(&mut self, slot: Slot) -> &mut u32 {
         if self.tickets.len() <= slot.index() {
             self.tickets.resize(slot.index() + 1, 0);
@@ -88,6 +107,7 @@ impl Published {
 impl Watch for Published {
     fn watch(&mut self, frame: &Frame, slot: Slot, kind: Kind, bounds: Bounds) {
         let ticket = *self.ticket(slot);
+        self.fresh += 1;
         self.insert(frames_until(frame, kind, &bounds), Entry { slot, kind, ticket });
     }
 
@@ -150,5 +170,96 @@ fn frames_until_for(frame: &Frame, view: &View, kind: Kind, bounds: &Bounds) -> 
             let fine = ((reach - distance) / rho).ceil();
             outside.max(invisible.min(fine))
         }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use std::f64::consts::PI;
+
+    use super::*;
+    use crate::criterion::Criterion;
+    use crate::motion::{Motion, Speed};
+    use crate::view::Camera;
+
+    /// At the origin, looking along x, with a cone of half-angle `beta`.
+    fn view(theta: f64) -> View {
+        let camera = Camera::look_at(DVec3::ZERO, DVec3::X, DVec3::Z, 1.0, 1.0);
+        View::new(&camera, theta)
+    }
+
+    /// A sphere at a distance, at an angle from the x axis.
+    fn sphere(distance: f64, angle: f64, radius: f64, eps: f64) -> Bounds {
+        let center = DVec3::new(distance * angle.cos(), distance * angle.sin(), 0.0);
+        Bounds { center: center.as_vec3().to_array(), radius: radius as f32, eps: eps as f32 }
+    }
+
+    fn until(views: &[View], kind: Kind, bounds: &Bounds, rho: f64, omega: f64) -> f64 {
+        let speed = Speed { rho, omega, kappa: 0.0 };
+        let criterion = Criterion::ScreenError;
+        let frame = Frame { criterion, views, speed, motion: Motion::Rest, cones: None };
+        frames_until(&frame, kind, bounds)
+    }
+
+    /// Each of the three times of Figure 4 decides where it should: the first of `t_i` and the later of `t_r` and `t_m`.
+    #[test]
+    fn a_node_unfolds_when_it_is_entered_or_both_seen_and_coarse() {
+        let view = view(0.01);
+        let beta = view.sin_beta.atan2(view.cos_beta);
+        let unfold = |bounds: &Bounds, rho, omega| until(&[view], Kind::Unfold, bounds, rho, omega);
+        // Coarse already, and to the side: until the cone's edge has turned to the sphere's, which is nearer than its centre.
+        let aside = sphere(10.0, 2.0, 2.0, 100.0);
+        let phi = 0.2_f64.asin();
+        assert_eq!(unfold(&aside, 0.001, 0.003), ((2.0 - phi - beta) / 0.003).ceil());
+        // In view already, and too far to be coarse.
+        let ahead = sphere(50.0, 0.1, 2.0, 0.1);
+        let reach = Criterion::ScreenError.reach_distance(&ahead, view.k);
+        assert!(reach < 40.0);
+        assert_eq!(unfold(&ahead, 0.25, 0.001), ((50.0 - reach) / 0.25).ceil());
+        // Both: the later one.
+        let both = sphere(50.0, 2.0, 2.0, 0.1);
+        let turn = ((2.0 - 0.04_f64.asin() - beta) / 0.01).ceil();
+        let come = ((50.0 - reach) / 0.125).ceil();
+        assert!(come > turn + 50.0);
+        assert_eq!(unfold(&both, 0.125, 0.01), come);
+        assert_eq!(unfold(&both, 0.3, 0.01), turn);
+        // Behind, where no turning brings it into view for long: until the sphere is entered.
+        let behind = sphere(10.0, PI, 4.0, 100.0);
+        assert_eq!(unfold(&behind, 0.5, 1e-6), 12.0);
+    }
+
+    /// The dual: once it is left, and then the first of out of view and fine.
+    #[test]
+    fn a_node_folds_when_it_is_left_and_unseen_or_fine() {
+        let view = view(0.01);
+        let beta = view.sin_beta.atan2(view.cos_beta);
+        let fold = |bounds: &Bounds, rho, omega| until(&[view], Kind::Fold, bounds, rho, omega);
+        // Near, and near the edge of the view: until the sphere's far edge has left it.
+        let edge = sphere(10.0, 0.3, 2.0, 100.0);
+        assert_eq!(fold(&edge, 0.001, 0.003), ((beta + 0.2_f64.asin() - 0.3) / 0.003).ceil());
+        // About to be fine.
+        let far = sphere(30.0, 0.1, 2.0, 0.25);
+        let reach = Criterion::ScreenError.reach_distance(&far, view.k);
+        assert!(reach > 35.0 && reach < 60.0, "{reach}");
+        assert_eq!(fold(&far, 0.25, 1e-6), ((reach - 30.0) / 0.25).ceil());
+        // Inside of it, though it is behind and out of view at once: not before it is left.
+        let around = sphere(1.0, PI, 4.0, 100.0);
+        assert_eq!(fold(&around, 0.25, 1.0), 12.0);
+        // Outside of it, and out of view at once.
+        assert_eq!(fold(&sphere(10.0, beta + 0.2, 2.0, 100.0), 0.001, 0.1), 1.0);
+    }
+
+    #[test]
+    fn the_first_view_unfolds_and_the_last_folds() {
+        let (near, far) = (view(0.01), view(0.02));
+        let bounds = sphere(100.0, 0.1, 2.0, 0.1);
+        let each = |kind| [near, far].map(|view| until(&[view], kind, &bounds, 0.25, 0.001));
+        let [a, b] = each(Kind::Unfold);
+        assert!(a < b);
+        assert_eq!(until(&[near, far], Kind::Unfold, &bounds, 0.25, 0.001), a);
+        let bounds = sphere(10.0, 0.1, 2.0, 0.4);
+        let [a, b] = [near, far].map(|view| until(&[view], Kind::Fold, &bounds, 0.25, 1e-6));
+        assert!(a > b);
+        assert_eq!(until(&[near, far], Kind::Fold, &bounds, 0.25, 1e-6), a);
     }
 }

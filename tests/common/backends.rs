@@ -94,6 +94,7 @@ fn follow<T: VertexTree + 'static>(settings: &[Settings], tree: impl Fn() -> T) 
 /// An engine, whatever its backend.
 pub trait Follower {
     fn advance(&mut self, views: &[View]) -> FrameReport;
+    fn assert_well_formed(&self);
     fn set_budget(&mut self, budget: Budget);
     fn strategy(&self) -> Strategy;
     /// The views of the last frame, as the budget made them.
@@ -109,6 +110,10 @@ pub trait Follower {
 impl<T: VertexTree> Follower for Engine<T, NullSink> {
     fn advance(&mut self, views: &[View]) -> FrameReport {
         self.advance(views).unwrap()
+    }
+
+    fn assert_well_formed(&self) {
+        self.assert_well_formed();
     }
 
     fn set_budget(&mut self, budget: Budget) {
@@ -138,6 +143,10 @@ struct OwnGraph<T> {
 impl<T: VertexTree> Follower for OwnGraph<T> {
     fn advance(&mut self, views: &[View]) -> FrameReport {
         self.engine.advance(views).unwrap()
+    }
+
+    fn assert_well_formed(&self) {
+        self.engine.assert_well_formed();
     }
 
     fn set_budget(&mut self, budget: Budget) {
@@ -189,6 +198,10 @@ pub struct Conformance<'a> {
 /// The triangles are counted by brute force once in so many frames.
 const COUNT_EVERY: u64 = 251;
 
+/// The state of the engines is checked in so many frames, and then once in so many: a check takes longer than a frame.
+const EVERY_FRAME: u64 = 1000;
+const CHECK_EVERY: u64 = 17;
+
 impl<'a> Conformance<'a> {
     pub fn new(log: &'a CollapseLog, settings: Settings) -> Self {
         let exact: Vec<Settings> = Strategy::ALL
@@ -224,6 +237,7 @@ impl<'a> Conformance<'a> {
     pub fn advance_each(&mut self, views: &[View]) {
         for (backend, follower) in &mut self.followers {
             let report = follower.advance(views);
+            follower.assert_well_formed();
             let difference = follower.difference(&mut self.oracle);
             let frame = self.totals.frames;
             assert_eq!(difference, "None", "{backend}, {}, frame {frame}", follower.strategy().name());
@@ -238,6 +252,9 @@ impl<'a> Conformance<'a> {
         let Self { log, settings, oracle, followers, totals } = self;
         let reports: Vec<FrameReport> =
             followers.iter_mut().map(|(_, follower)| follower.advance(views)).collect();
+        if totals.frames < EVERY_FRAME || totals.frames.is_multiple_of(CHECK_EVERY) {
+            followers.iter().for_each(|(_, follower)| follower.assert_well_formed());
+        }
         // A budget in triangles steers all alike.
         oracle.cut(settings.criterion, followers[0].1.views());
         let (hash, nodes) = (oracle.cut_hash(), oracle.active_nodes() as u64);

@@ -147,6 +147,10 @@ impl Follower for Own {
         advance_settled(&mut self.engine, views)
     }
 
+    fn assert_well_formed(&self) {
+        self.engine.assert_well_formed();
+    }
+
     fn set_budget(&mut self, budget: Budget) {
         self.engine.set_budget(budget);
     }

@@ -78,6 +78,9 @@ impl<T: VertexTree> VertexTree for Foreseen<T> {
         }
         true
     }
+    fn assert_well_formed(&self) {
+        self.tree.assert_well_formed();
+    }
     fn begin_frame(&mut self, arrived: &mut Vec<NodeId>) -> Result<(), TreeError> {
         self.named.clear();
         self.changed.clear();

@@ -97,6 +97,7 @@ fn assert_exact(needing: usize) -> (u64, u64, u64) {
             for frame in 0..400 {
                 step(&mut views, &mut random);
                 let report = walker.engine.advance(&views).unwrap();
+                walker.engine.assert_well_formed();
                 let what = format!("seed {seed}, frame {frame}");
                 let name = walker.strategy.name();
                 assert_eq!(report.misses, 0, "{name}, {what}: nothing was refused");
@@ -178,6 +179,7 @@ fn pages_that_come_late_are_waited_for_and_counted() {
                     for _ in 0..12 {
                         step(&mut views, &mut random);
                         let report = walker.engine.advance(&views).unwrap();
+                        walker.engine.assert_well_formed();
                         walker.assert_valid(&what);
                         let refused = walker.log.borrow().refused.len() as u64;
                         let name = walker.strategy.name();
@@ -194,6 +196,7 @@ fn pages_that_come_late_are_waited_for_and_counted() {
                     // Nothing is left to do, and nothing is asked for any more.
                     for _ in 0..3 {
                         let report = walker.engine.advance(&views).unwrap();
+                        walker.engine.assert_well_formed();
                         assert_eq!((report.misses, report.unfolds, report.folds), (0, 0, 0), "{what}");
                         misses += report.misses;
                     }

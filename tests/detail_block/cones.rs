@@ -76,7 +76,7 @@ fn what_is_seen_from_behind_stays_coarse() {
                 }
                 if frame % 60 == 0 {
                     assert_eq!(all.wrong(engine), 0, "{name}, frame {frame}");
-                    engine.tree().assert_well_formed();
+                    engine.assert_well_formed();
                     assert_closed(engine.mesh());
                 }
             }

@@ -63,7 +63,7 @@ fn flies(name: &str, log: &CollapseLog, is_manifold: bool, is_closed: bool) {
         let found = (report.cut_hash, report.active_nodes, report.triangles);
         assert_eq!(found, cut.find(&settings, engine.views()), "{name}, frame {frame}");
         assert_eq!(report.forced, 0, "{name}, frame {frame}: bounds are nested over all needs");
-        engine.tree().assert_well_formed();
+        engine.assert_well_formed();
         if is_closed {
             assert_closed(engine.mesh());
         }
@@ -78,7 +78,7 @@ fn flies(name: &str, log: &CollapseLog, is_manifold: bool, is_closed: bool) {
     let views = [DVec3::X, DVec3::Y, DVec3::Z].map(|d| [d, -d]).as_flattened().to_vec();
     let views: Vec<View> = views.iter().map(|&direction| ahead.with_direction(direction).unwrap()).collect();
     advance_settled(&mut engine, &views);
-    engine.tree().assert_well_formed();
+    engine.assert_well_formed();
     let key = |mesh: &Mesh, corners: &[u32; 3]| {
         let [a, b, c] = corners.map(|v| mesh.positions[v as usize].map(f32::to_bits));
         [a, b, c].min([b, c, a]).min([c, a, b])
@@ -192,7 +192,7 @@ fn forced_cuts_are_the_closure() {
             assert_eq!((report.cut_hash, report.active_nodes), expected, "{name}, frame {frame}");
             (forced, changes) = (forced + report.forced, changes + report.unfolds);
             if frame % 50 == 0 {
-                engine.tree().assert_well_formed();
+                engine.assert_well_formed();
                 assert_closed(engine.mesh());
             }
         }
@@ -229,7 +229,7 @@ fn a_bad_store_delays_and_no_more() {
                 random_step(&mut view, &mut random);
                 faults += engine.advance(&[placed(&log.mesh, view)]).unwrap().pages.faults;
             }
-            engine.tree().assert_well_formed();
+            engine.assert_well_formed();
             source.set(Faults::default());
             engine.tree_mut().settle().unwrap();
             let report = advance_settled(&mut engine, &[placed(&log.mesh, view)]);

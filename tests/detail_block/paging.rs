@@ -48,7 +48,7 @@ fn the_hard_quota_holds_over_100_000_frames() {
         misses += report.misses;
         limited += u64::from(report.misses > 0);
         if frame % 997 == 0 {
-            engine.tree().assert_well_formed();
+            engine.assert_well_formed();
         }
     }
     let counts = engine.tree().counts();
@@ -73,6 +73,7 @@ fn what_is_removed_is_not_wanted_again_soon() {
             for frame in 0..path.frames.len() {
                 let view = path.view(frame, theta_of_pixels(1.0, 1080)).unwrap();
                 engine.advance(&[view]).unwrap();
+                engine.assert_well_formed();
                 beyond += usize::from(engine.tree().block_bytes().0 > soft);
             }
             let counts = engine.tree().counts();

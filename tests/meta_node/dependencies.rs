@@ -194,6 +194,7 @@ fn forcing_gets_there_with_little_memory() {
                 for _ in 0..random.below(20) {
                     random_step(&mut view, &mut random);
                     engine.advance(&[view]).unwrap();
+                    engine.assert_well_formed();
                 }
                 settle(&mut engine, &[view]);
                 oracle.cut(engine.settings().criterion, &[view]);
@@ -205,6 +206,7 @@ fn forcing_gets_there_with_little_memory() {
                 assert_eq!(wrong, 0, "{} place holders, {}, round {round}", holders, strategy.name());
                 // And nothing moves any more.
                 let report = engine.advance(&[view]).unwrap();
+                engine.assert_well_formed();
                 assert_eq!((report.misses, report.unfolds, report.folds), (0, 0, 0), "round {round}");
             }
             assert!(beyond > 20, "{beyond} nodes were forced in all settled cuts");

@@ -44,6 +44,7 @@ fn settings(strategy: Strategy) -> Settings {
 fn settle<M: MeshSink>(engine: &mut Engine<MetaNodeTree, M>, views: &[View]) -> FrameReport {
     for _ in 0..20_000 {
         let report = engine.advance(views).unwrap();
+        engine.assert_well_formed();
         if report.misses == 0 {
             return report;
         }
@@ -74,6 +75,7 @@ fn a_camera_that_stops_always_gets_its_cut() {
                 for _ in 0..random.below(40) {
                     random_step(&mut view, &mut random);
                     let report = engine.advance(&[view]).unwrap();
+                    engine.assert_well_formed();
                     assert!(report.pages.resident_bytes <= page_memory, "{:?}", report.pages);
                     misses += report.misses;
                 }
@@ -103,11 +105,13 @@ fn memory_may_change_while_the_camera_moves() {
         // Nothing is being read, and what is allowed holds from the first frame on.
         engine.tree_mut().settle().unwrap();
         engine.advance(&[view]).unwrap();
+        engine.assert_well_formed();
         engine.tree_mut().settle().unwrap();
         engine.tree_mut().set_page_memory(holders * each).unwrap();
         for _ in 0..20 {
             random_step(&mut view, &mut random);
             let report = engine.advance(&[view]).unwrap();
+            engine.assert_well_formed();
             assert!(
                 report.pages.resident_bytes <= holders * each,
                 "{:?}, {holders} place holders",
@@ -136,9 +140,11 @@ fn where_pages_in_use_stay_the_front_still_follows() {
         for _ in 0..30 {
             random_step(&mut view, &mut random);
             engine.advance(&[view]).unwrap();
+            engine.assert_well_formed();
         }
         for _ in 0..200 {
             engine.advance(&[view]).unwrap();
+            engine.assert_well_formed();
             engine.tree_mut().settle().unwrap();
         }
         oracle.cut(engine.settings().criterion, &[view]);
@@ -193,6 +199,7 @@ fn the_displayed_mesh_is_that_of_the_in_memory_tree() {
             for _ in 0..5 {
                 random_step(&mut view, &mut random);
                 engine.advance(&[view]).unwrap();
+                engine.assert_well_formed();
                 reference.advance(&[view]).unwrap();
             }
             settle(&mut engine, &[view]);

@@ -34,6 +34,7 @@ fn assert_converges<M: MeshSink>(
 ) {
     for _ in 0..4000 {
         let report = engine.advance(views).unwrap();
+        engine.assert_well_formed();
         let memory = engine.tree().memory();
         assert!(memory.used() <= memory.limit(), "{what}: {} of {} bytes", memory.used(), memory.limit());
         if report.misses == 0 {
@@ -62,6 +63,7 @@ fn the_least_memory_is_enough() {
                 for _ in 0..8 {
                     views = walk.step();
                     engine.advance(&views).unwrap();
+                    engine.assert_well_formed();
                     assert!(memory.used() <= memory.limit());
                 }
                 let what = format!("{}, {times} times the least memory, round {round}", mode.name());
@@ -99,6 +101,7 @@ fn the_limit_can_be_changed() {
         for _ in 0..40 {
             let views = walk.step();
             engine.advance(&views).unwrap();
+            engine.assert_well_formed();
             assert!(memory.used() <= limit, "{} of {limit} bytes", memory.used());
         }
         let views = walk.step();
@@ -119,6 +122,7 @@ fn modes_differ_in_what_they_keep_only() {
         for (at, engine) in engines.iter_mut().enumerate() {
             for frame in 0.. {
                 let report = engine.advance(&views).unwrap();
+                engine.assert_well_formed();
                 reads[at] += report.pages.reads;
                 if report.misses == 0 {
                     break;
@@ -172,6 +176,7 @@ fn a_store_that_fails_now_and_then() {
             for _ in 0..3000 {
                 engine.tree_mut().settle().unwrap();
                 let report = engine.advance(&views).unwrap();
+                engine.assert_well_formed();
                 counted += report.pages.faults;
                 if report.misses == 0 {
                     break;
@@ -256,6 +261,7 @@ fn dropping_a_tree_never_hangs() {
         let mut walk = Walk::new(seed, 300.0);
         for _ in 0..3 {
             engine.advance(&walk.step()).unwrap();
+            engine.assert_well_formed();
         }
         assert!(memory.used() > 0);
         drop(engine);

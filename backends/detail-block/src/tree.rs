@@ -344,6 +344,12 @@ impl VertexTree for XfmTree {
         Ok(())
     }
 
+    #[track_caller]
+    fn assert_well_formed(&self) {
+        // The type's own, which goes before this one.
+        XfmTree::assert_well_formed(self);
+    }
+
     fn end_frame(&mut self) -> Result<PageStats, TreeError> {
         if self.foresees {
             self.paging.ask_for_foreseen();

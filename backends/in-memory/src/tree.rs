@@ -166,6 +166,14 @@ impl VertexTree for InMemoryTree {
         }
     }
 
+    #[track_caller]
+    fn assert_well_formed(&self) {
+        if let Some(stars) = &self.mesh {
+            stars.assert_well_formed();
+            assert_eq!(stars.displayed() as u64, self.displayed, "triangles displayed");
+        }
+    }
+
     fn end_frame(&mut self) -> Result<PageStats, TreeError> {
         let h = &self.hierarchy;
         let resident_bytes = (h.nodes.len() * (size_of::<Node>() + 16)

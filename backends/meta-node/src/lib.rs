@@ -21,6 +21,10 @@
 //! # }
 //! ```
 
+// Test files are shared with those outside of the crate, who know it by this name.
+#[cfg(test)]
+extern crate self as meta_node;
+
 mod arrange;
 mod arranging;
 mod blocking;

@@ -37,6 +37,9 @@ mod counts;
 mod foresight;
 mod memory;
 mod requests;
+#[cfg(test)]
+mod tests;
+mod well_formed;
 
 use std::collections::VecDeque;
 use std::sync::Arc;

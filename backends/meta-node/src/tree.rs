@@ -420,6 +420,15 @@ impl VertexTree for MetaNodeTree {
         Ok(())
     }
 
+    #[track_caller]
+    fn assert_well_formed(&self) {
+        if let Some(stars) = &self.mesh {
+            stars.assert_well_formed();
+            assert_eq!(stars.displayed() as u64, self.displayed, "triangles displayed");
+        }
+        self.pager.assert_well_formed();
+    }
+
     fn end_frame(&mut self) -> Result<PageStats, TreeError> {
         Ok(self.pager.end_frame())
     }

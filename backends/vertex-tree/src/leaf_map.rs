@@ -48,6 +48,11 @@ impl LeafMap {
         self.entries[self.find(leaf)][1]
     }
 
+    /// How many leaves are shown.
+    pub fn len(&self) -> usize {
+        self.len
+    }
+
     #[inline(always)]
     pub fn insert(&mut self, leaf: u32, vertex: u32) {
         if 4 * (self.len + 1) > self.entries.len() {

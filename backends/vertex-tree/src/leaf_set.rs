@@ -40,6 +40,12 @@ impl LeafSet {
         prefetch(&self.words, number as usize / 64);
     }
 
+    /// How many members there are.
+    pub fn count(&self) -> usize {
+        let end = self.starts.get(1).copied().filter(|_| self.levels > 1).unwrap_or(self.words.len());
+        self.words[..end].iter().map(|word| word.count_ones() as usize).sum()
+    }
+
     #[inline]
     pub fn insert(&mut self, number: u32) {
         let mut at = number as usize;

@@ -17,6 +17,7 @@
 //! [`stars`]: crate::stars
 
 mod following;
+mod well_formed;
 
 use crate::leaf_map::LeafMap;
 use crate::leaf_set::LeafSet;

@@ -156,6 +156,37 @@ impl Stars {
         self.stars.get(slot as usize).is_some_and(|star| star.leaf == leaf)
     }
 
+    /// The slots in use, and the leaf that is shown in each.
+    pub fn leaves(&self) -> impl Iterator<Item = (VertexId, u32)> + '_ {
+        (0..).zip(&self.stars).map(|(slot, star)| (slot, star.leaf)).filter(|&(_, leaf)| leaf != NONE)
+    }
+
+    /// Checks the slots to use again, and the lists.
+    ///
+    /// # Panics
+    /// At the first thing that is wrong.
+    #[track_caller]
+    pub fn assert_well_formed(&self) {
+        let mut listed = vec![false; self.stars.len()];
+        for &hole in &self.holes {
+            let twice = std::mem::replace(&mut listed[hole as usize], true);
+            assert!(!twice, "vertex {hole} is listed as a hole twice");
+        }
+        let (mut far, mut many) = (0, 0);
+        for (slot, (star, listed)) in self.stars.iter().zip(listed).enumerate() {
+            assert_eq!(star.leaf == NONE, listed, "vertex {slot} is listed as a hole if it is one");
+            assert!(
+                star.count == FAR || star.count as usize <= NEAR,
+                "corners at vertex {slot}: {}",
+                star.count
+            );
+            far += usize::from(star.count == FAR);
+            many += usize::from(list(star.brought).is_some());
+        }
+        assert_eq!(far + self.far.unused.len(), self.far.lists.len(), "lists of corners");
+        assert_eq!(many + self.listed.unused.len(), self.listed.lists.len(), "lists of triangles");
+    }
+
     #[inline(always)]
     pub fn prefetch(&self, slot: VertexId) {
         prefetch(&self.stars, slot as usize);

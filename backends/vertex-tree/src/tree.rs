@@ -268,6 +268,12 @@ pub trait VertexTree {
     fn settle(&mut self) -> Result<(), TreeError> {
         Ok(())
     }
+    /// Checks what the backend knows of its own state, between two frames: for tests. The engine's own check calls it.
+    ///
+    /// # Panics
+    /// At the first thing that is wrong.
+    #[track_caller]
+    fn assert_well_formed(&self) {}
     /// Ends a frame: the moment for eviction.
     ///
     /// # Errors

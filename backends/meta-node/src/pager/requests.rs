@@ -102,7 +102,7 @@ impl Pager {
         holder.inspect(|&holder| self.evict(holder)).is_some()
     }
 
-    fn give_free(&mut self) -> bool {
+    pub(super) fn give_free(&mut self) -> bool {
         self.evict_one(self.takeable(Class::Free, self.frame))
     }
 

@@ -234,6 +234,31 @@ mod tests {
         }
     }
 
+    /// Of the pages in memory, one that has been asked for since the hand last passed stays.
+    #[test]
+    fn a_page_that_is_used_has_a_second_chance() {
+        let mut array = Array::new(&Scratch { folder: std::env::temp_dir() }, 10_000, 0_u64, 0);
+        let page = Array::<u64>::PAGE;
+        let held = |array: &Array<u64>| {
+            let in_memory = |&page: &usize| array.places[page] < ON_DISK;
+            (0..8).filter(in_memory).collect::<Vec<_>>()
+        };
+        for used in 0..4 {
+            array.set(used * page, 1).unwrap();
+        }
+        assert_eq!((array.room, held(&array)), (4, vec![0, 1, 2, 3]));
+        // All have been used: the hand goes round, and the first page has had its chance.
+        array.get(4 * page).unwrap();
+        assert_eq!(held(&array), [1, 2, 3, 4]);
+        for used in [1, 3] {
+            array.get(used * page).unwrap();
+        }
+        array.get(5 * page).unwrap();
+        assert_eq!(held(&array), [1, 3, 4, 5], "page 2 has not been used since");
+        array.get(6 * page).unwrap();
+        assert_eq!(held(&array), [3, 4, 5, 6], "page 1 has had its chance, and has not been used since");
+    }
+
     #[test]
     fn without_a_folder_it_says_so() {
         let mut array = Array::new(&Scratch { folder: "/nowhere/at/all".into() }, 100_000, 0_u64, 0);

@@ -1,0 +1,38 @@
+//! Whether a queue is what it should be.
+
+use super::pool::CHUNK;
+use super::wheel::Wheel;
+use super::{Event, EventQueue};
+
+impl EventQueue {
+    /// Calls `f` with every event that has not been cancelled.
+    pub(crate) fn for_each(&self, mut f: impl FnMut(&Event)) {
+        let buckets = self.wheels.iter().flat_map(|wheel| wheel.levels.as_flattened());
+        for &bucket in buckets.chain(&self.ripe).chain([&self.pressing]) {
+            self.read(bucket, &mut f);
+        }
+    }
+
+    /// Checks that every chunk is in one bucket or free, that no bucket can be overlooked by an advance, and the counts.
+    ///
+    /// # Panics
+    /// At the first thing that is wrong.
+    #[track_caller]
+    pub(crate) fn assert_well_formed(&self) {
+        let (mut stored, mut valid, mut chunks) = (0, 0, 0);
+        let buckets = self.wheels.iter().flat_map(|wheel| wheel.levels.as_flattened());
+        for &bucket in buckets.chain(&self.ripe).chain([&self.pressing]) {
+            let mut count = 0_usize;
+            self.pool.read(bucket, |event| {
+                count += 1;
+                valid += usize::from(self.is_valid(event));
+            });
+            stored += count;
+            chunks += count.div_ceil(CHUNK as usize);
+        }
+        assert_eq!(stored, self.stored, "events in all buckets");
+        assert!(self.stored - valid <= self.cancelled, "more events are cancelled than {}", self.cancelled);
+        self.pool.assert_used(chunks);
+        self.wheels.iter().for_each(Wheel::assert_well_formed);
+    }
+}
