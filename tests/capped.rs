@@ -38,7 +38,7 @@ fn engine(log: &CollapseLog, strategy: Strategy, work_cap: WorkCap) -> Engine<In
 }
 
 fn moved(view: &mut View, by: DVec3) {
-    view.eye += by;
+    *view = view.with_eye(view.eye() + by).unwrap();
 }
 
 fn active<T: VertexTree, M: MeshSink>(engine: &Engine<T, M>) -> BTreeSet<NodeId> {
@@ -182,9 +182,9 @@ fn folds_have_their_share() {
         let eye = DVec3::new(0.2, 0.1, 0.6);
         let view = |direction: DVec3| {
             let mut view = random_view(&mut Random(1));
-            let by = eye - view.eye;
+            let by = eye - view.eye();
             moved(&mut view, by);
-            view.direction = direction.normalize();
+            view = view.with_direction(direction.normalize()).unwrap();
             view
         };
         engine.advance(&[view(DVec3::new(1.0, 0.0, -0.5))]).unwrap();
@@ -271,9 +271,9 @@ fn urgencies_are_at_most_eight_frames_old() {
     };
     // Down on the grid from where the eye is in no sphere but the largest, which are unfolded first.
     let mut view = random_view(&mut random);
-    let by = DVec3::new(-1.5, 0.3, 1.2) - view.eye;
+    let by = DVec3::new(-1.5, 0.3, 1.2) - view.eye();
     moved(&mut view, by);
-    view.direction = -DVec3::Z;
+    view = view.with_direction(-DVec3::Z).unwrap();
     engine.set_work_cap(WorkCap::None);
     engine.advance(&[view]).unwrap();
     engine.set_work_cap(WorkCap::Changes(4));

@@ -237,7 +237,7 @@ proptest! {
 
 /// At the origin, looking along x.
 fn looking_along_x() -> View {
-    View::new(&Camera::look_at(DVec3::ZERO, DVec3::X, DVec3::Z, 1.0, 1.0), 0.01)
+    View::new(&Camera::look_at(DVec3::ZERO, DVec3::X, DVec3::Z, 1.0, 1.0).unwrap(), 0.01).unwrap()
 }
 
 /// A sphere at a distance, at an angle from the x axis.
@@ -260,10 +260,10 @@ fn assert_about(found: f64, expected: f64, what: &str) {
 #[test]
 fn a_bound_on_unfolding_is_the_later_of_two_times() {
     let view = looking_along_x();
-    let beta = view.sin_beta.atan2(view.cos_beta);
+    let beta = view.sin_beta().atan2(view.cos_beta());
     let earliest =
         |bounds: &Bounds, course: Course| Criterion::ScreenError.earliest_unfold(&[view], &course, bounds);
-    let reach = |bounds: &Bounds| Criterion::ScreenError.reach_distance(bounds, view.k);
+    let reach = |bounds: &Bounds| Criterion::ScreenError.reach_distance(bounds, view.k());
     // In view, and so far away that it is fine.
     let far = sphere(100.0, 0.0, 2.0, 0.1);
     let gap = 100.0 - reach(&far);
@@ -310,10 +310,10 @@ fn a_bound_on_unfolding_is_the_later_of_two_times() {
 #[test]
 fn a_bound_on_folding_is_the_later_of_leaving_and_the_first_of_two_times() {
     let view = looking_along_x();
-    let beta = view.sin_beta.atan2(view.cos_beta);
+    let beta = view.sin_beta().atan2(view.cos_beta());
     let earliest =
         |bounds: &Bounds, course: Course| Criterion::ScreenError.earliest_fold(&[view], &course, bounds);
-    let reach = |bounds: &Bounds| Criterion::ScreenError.reach_distance(bounds, view.k);
+    let reach = |bounds: &Bounds| Criterion::ScreenError.reach_distance(bounds, view.k());
     // In view, out to its far edge.
     let inside = sphere(100.0, beta - 0.1, 2.0, 10.0);
     let room = 100.0 * 0.1_f64.sin() + 2.0;

@@ -184,13 +184,13 @@ mod tests {
 
     /// At the origin, looking along x, with a cone of half-angle `beta`.
     fn view(theta: f64) -> View {
-        let camera = Camera::look_at(DVec3::ZERO, DVec3::X, DVec3::Z, 1.0, 1.0);
-        View::new(&camera, theta)
+        let camera = Camera::look_at(DVec3::ZERO, DVec3::X, DVec3::Z, 1.0, 1.0).unwrap();
+        View::new(&camera, theta).unwrap()
     }
 
     /// A sphere at a distance, at an angle from the x axis.
     fn sphere(distance: f64, angle: f64, radius: f64, eps: f64) -> Bounds {
-        let center = DVec3::new(distance * angle.cos(), distance * angle.sin(), 0.0);
+        let center = DVec3::new(distance * libm::cos(angle), distance * libm::sin(angle), 0.0);
         Bounds { center: center.as_vec3().to_array(), radius: radius as f32, eps: eps as f32 }
     }
 
@@ -205,20 +205,20 @@ mod tests {
     #[test]
     fn a_node_unfolds_when_it_is_entered_or_both_seen_and_coarse() {
         let view = view(0.01);
-        let beta = view.sin_beta.atan2(view.cos_beta);
+        let beta = libm::atan2(view.sin_beta(), view.cos_beta());
         let unfold = |bounds: &Bounds, rho, omega| until(&[view], Kind::Unfold, bounds, rho, omega);
         // Coarse already, and to the side: until the cone's edge has turned to the sphere's, which is nearer than its centre.
         let aside = sphere(10.0, 2.0, 2.0, 100.0);
-        let phi = 0.2_f64.asin();
+        let phi = libm::asin(0.2);
         assert_eq!(unfold(&aside, 0.001, 0.003), ((2.0 - phi - beta) / 0.003).ceil());
         // In view already, and too far to be coarse.
         let ahead = sphere(50.0, 0.1, 2.0, 0.1);
-        let reach = Criterion::ScreenError.reach_distance(&ahead, view.k);
+        let reach = Criterion::ScreenError.reach_distance(&ahead, view.k());
         assert!(reach < 40.0);
         assert_eq!(unfold(&ahead, 0.25, 0.001), ((50.0 - reach) / 0.25).ceil());
         // Both: the later one.
         let both = sphere(50.0, 2.0, 2.0, 0.1);
-        let turn = ((2.0 - 0.04_f64.asin() - beta) / 0.01).ceil();
+        let turn = ((2.0 - libm::asin(0.04) - beta) / 0.01).ceil();
         let come = ((50.0 - reach) / 0.125).ceil();
         assert!(come > turn + 50.0);
         assert_eq!(unfold(&both, 0.125, 0.01), come);
@@ -232,14 +232,14 @@ mod tests {
     #[test]
     fn a_node_folds_when_it_is_left_and_unseen_or_fine() {
         let view = view(0.01);
-        let beta = view.sin_beta.atan2(view.cos_beta);
+        let beta = libm::atan2(view.sin_beta(), view.cos_beta());
         let fold = |bounds: &Bounds, rho, omega| until(&[view], Kind::Fold, bounds, rho, omega);
         // Near, and near the edge of the view: until the sphere's far edge has left it.
         let edge = sphere(10.0, 0.3, 2.0, 100.0);
-        assert_eq!(fold(&edge, 0.001, 0.003), ((beta + 0.2_f64.asin() - 0.3) / 0.003).ceil());
+        assert_eq!(fold(&edge, 0.001, 0.003), ((beta + libm::asin(0.2) - 0.3) / 0.003).ceil());
         // About to be fine.
         let far = sphere(30.0, 0.1, 2.0, 0.25);
-        let reach = Criterion::ScreenError.reach_distance(&far, view.k);
+        let reach = Criterion::ScreenError.reach_distance(&far, view.k());
         assert!(reach > 35.0 && reach < 60.0, "{reach}");
         assert_eq!(fold(&far, 0.25, 1e-6), ((reach - 30.0) / 0.25).ceil());
         // Inside of it, though it is behind and out of view at once: not before it is left.
