@@ -50,7 +50,9 @@ fn check(mesh: &Mesh, log: &CollapseLog, report: &Report) {
     let Some((low, high)) = mesh.bounding_box() else { return };
     let [low, high] = [low, high].map(|corner| DVec3::from(corner.map(f64::from)));
     for _ in 0..4 {
-        let distance = mesh.extent() * 10_f64.powf(2.0 * random.unit() - 1.5);
+        // A mesh may be a single point, which nothing can look at from there.
+        let extent = if mesh.extent() > 0.0 { mesh.extent() } else { 1.0 };
+        let distance = extent * 10_f64.powf(2.0 * random.unit() - 1.5);
         let eye = (low + high) * 0.5 + random.direction() * distance;
         let target = low + (high - low) * DVec3::new(random.unit(), random.unit(), random.unit());
         let camera = Camera::look_at(eye, target, DVec3::Y, 1.0, 16.0 / 9.0).unwrap();
