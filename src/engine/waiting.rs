@@ -50,9 +50,13 @@ impl Waiting {
         &self.changes
     }
 
-    /// Those that wait still: the front knows of them.
+    /// Those that wait still: the front knows of them, and nothing that has happened in the frame has made them impossible.
     pub fn valid(&self, front: &Front) -> impl Iterator<Item = (Slot, Kind)> {
-        self.changes.iter().filter(|change| change.is_valid(front)).map(|change| (change.slot, change.kind))
+        let is_possible = |change: &&Change| {
+            let record = front.record(change.slot);
+            change.is_valid(front) && (record.is_boundary() || record.is_collapsible())
+        };
+        self.changes.iter().filter(is_possible).map(|change| (change.slot, change.kind))
     }
 }
 

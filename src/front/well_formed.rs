@@ -91,7 +91,7 @@ impl Front {
         }
         let linked: Vec<NodeId> = self.slots_in(self.below(record)).map(|child| self.node(child)).collect();
         let children: Vec<NodeId> = tree.children(node).collect();
-        if children.is_empty() && count > 0 {
+        if children.is_empty() {
             return;
         }
         // In a graph, a child may be linked below another parent.
