@@ -79,8 +79,8 @@ impl Party {
         for engine in &mut self.engines {
             let report = engine.advance(views).unwrap();
             self.changes += report.unfolds + report.folds;
-            // The place for `engine.assert_well_formed()`.
             if is_checked {
+                engine.assert_well_formed();
                 let name = engine.settings().strategy.name();
                 let difference = self.oracle.compare(engine);
                 assert!(difference.is_none(), "{name}, frame {}: {difference:?}; {views:?}", self.frames);
