@@ -5,7 +5,6 @@ mod common;
 use std::alloc::{GlobalAlloc, Layout, System};
 use std::cell::Cell;
 use std::sync::Arc;
-use std::time::Duration;
 
 use common::foreseen::Foreseen;
 use common::{Random, bumpy_grid, random_log, random_view, turn};
@@ -50,12 +49,7 @@ static ALLOCATOR: Counting = Counting;
 fn a_path_that_has_been_walked_before_allocates_nothing() {
     let strategies = [Strategy::TopDown, Strategy::Front, Strategy::Event];
     // With and without looking ahead, and with changes carried from frame to frame.
-    let ways = [
-        (0, WorkCap::None),
-        (4, WorkCap::None),
-        (0, WorkCap::Changes(2)),
-        (4, WorkCap::Time(Duration::ZERO)),
-    ];
+    let ways = [(0, WorkCap::None), (4, WorkCap::None), (0, WorkCap::Changes(2))];
     for (strategy, (look_ahead, work_cap)) in
         strategies.into_iter().flat_map(|strategy| ways.map(|way| (strategy, way)))
     {

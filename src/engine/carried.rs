@@ -154,7 +154,12 @@ impl Carried {
     pub(super) fn put(&mut self, kind: Kind, slot: Slot, urgency: f64) {
         let ticket = self.give_ticket(slot);
         let entry = Urgent { urgency: urgency.max(0.0).to_bits(), slot, ticket };
-        self.line(kind).heaps[slot.index() % HEAPS].push(entry);
+        let heap = &mut self.line(kind).heaps[slot.index() % HEAPS];
+        // Which heap how many are on is chance: room enough that they seldom need more.
+        if heap.len() == heap.capacity() {
+            heap.reserve(heap.len().max(64));
+        }
+        heap.push(entry);
     }
 
     /// Takes out the most urgent change.
