@@ -199,8 +199,8 @@ pub struct Conformance<'a> {
 const COUNT_EVERY: u64 = 251;
 
 /// The state of the engines is checked in so many frames, and then once in so many: a check takes longer than a frame.
-const EVERY_FRAME: u64 = 1000;
-const CHECK_EVERY: u64 = 17;
+const EVERY_FRAME: u64 = 100;
+const CHECK_EVERY: u64 = 101;
 
 impl<'a> Conformance<'a> {
     pub fn new(log: &'a CollapseLog, settings: Settings) -> Self {
