@@ -15,6 +15,7 @@ mod text;
 
 use glam::{DQuat, DVec3};
 
+#[cfg(feature = "cli")]
 pub(crate) use around::FOV_Y;
 pub use around::around;
 pub use format::PathError;
