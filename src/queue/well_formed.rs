@@ -1,16 +1,18 @@
 //! Whether a queue is what it should be.
 
-use super::pool::CHUNK;
+use super::pool::{Bucket, CHUNK};
 use super::wheel::Wheel;
 use super::{Event, EventQueue};
 
 impl EventQueue {
     /// Calls `f` with every event that has not been cancelled.
     pub(crate) fn for_each(&self, mut f: impl FnMut(&Event)) {
-        let buckets = self.wheels.iter().flat_map(|wheel| wheel.levels.as_flattened());
-        for &bucket in buckets.chain(&self.ripe).chain([&self.pressing]) {
-            self.read(bucket, &mut f);
-        }
+        self.buckets().for_each(|bucket| self.read(bucket, &mut f));
+    }
+
+    fn buckets(&self) -> impl Iterator<Item = Bucket> + '_ {
+        let waiting = self.wheels.iter().flat_map(|wheel| wheel.levels.as_flattened());
+        waiting.chain(&self.ripe).chain([&self.pressing]).copied()
     }
 
     /// Checks that every chunk is in one bucket or free, that no bucket can be overlooked by an advance, and the counts.
@@ -20,8 +22,7 @@ impl EventQueue {
     #[track_caller]
     pub(crate) fn assert_well_formed(&self) {
         let (mut stored, mut valid, mut chunks) = (0, 0, 0);
-        let buckets = self.wheels.iter().flat_map(|wheel| wheel.levels.as_flattened());
-        for &bucket in buckets.chain(&self.ripe).chain([&self.pressing]) {
+        for bucket in self.buckets() {
             let mut count = 0_usize;
             self.pool.read(bucket, |event| {
                 count += 1;

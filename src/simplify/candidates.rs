@@ -8,11 +8,10 @@
 //! round before: what one block of vertices does never waits for what others will do. Whether a collapse is legal costs more to say, and is asked when its turn comes:
 //! most candidates are overtaken by a change nearby before that.
 
-use glam::{Vec3, Vec4};
+use glam::Vec3;
 use vertex_tree::NONE;
 
 use super::key_counts::KeyCounts;
-use super::lanes::{self, Lanes};
 use super::marks::Marks;
 use super::quadric::Quadric;
 use super::surface::{Neighbour, Surface};
@@ -123,35 +122,10 @@ impl Candidates {
         }
         // Triangles close up around `v`, so every neighbour comes next in one of them.
         let quadric = &surface.quadrics[v as usize];
-        let (mut cheapest, mut four, mut count) = ((f32::INFINITY, NONE), [0; 4], 0);
-        let mut take = |four: [u32; 4]| {
-            let keys = edge_keys(quadric, lanes::gathered(four.map(|w| self.way(v, w, surface))));
-            for edge in keys.to_array().into_iter().zip(four) {
-                cheapest = cheaper(cheapest, edge);
-            }
-        };
-        for spoke in surface.spokes(v) {
-            four[count] = spoke.next;
-            count += 1;
-            if count == 4 {
-                take(four);
-                count = 0;
-            }
-        }
-        if count > 0 {
-            // The last one more than once.
-            let last = four[count - 1];
-            four[count..].fill(last);
-            take(four);
-        }
+        let neighbours = surface.spokes(v).map(|s| (edge_key(quadric, self.way(v, s.next, surface)), s.next));
         let partners = surface.virtual_edges.partners(v);
         let partners = partners.map(|w| (virtual_key(quadric, self.way(v, w, surface)), w));
-        // One after the other, as most vertices have no partners: a chain is asked each time which of the two it is in.
-        let cheapest = (cheapest.1 != NONE)
-            .then_some(cheapest)
-            .into_iter()
-            .chain(partners.reduce(cheaper))
-            .reduce(cheaper);
+        let cheapest = neighbours.chain(partners).reduce(cheaper);
         self.set(v, cheapest, State::Cheapest);
     }
 
@@ -232,11 +206,6 @@ impl Candidates {
 /// Keys are finite; infinity stands for no edge.
 fn edge_key(quadric: &Quadric, d: Vec3) -> f32 {
     (quadric.error(d) + LENGTH_TERM * d.length_squared()).min(f32::MAX)
-}
-
-/// The [`edge_key`] of four edges, to the same bits.
-fn edge_keys(quadric: &Quadric, d: Lanes) -> Vec4 {
-    (quadric.errors(d) + lanes::dot(d, d) * LENGTH_TERM).min(Vec4::splat(f32::MAX))
 }
 
 /// Joining what is apart shows surface where there was none: the distance itself is an error.

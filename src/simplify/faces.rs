@@ -93,19 +93,17 @@ impl Faces {
     /// is no farther away.
     pub fn nearest(&self, p: Vec3, beside: Option<usize>) -> (u32, f32) {
         let range = self.range(beside);
-        let (mut nearest, mut least) = (4 * range.start, f32::INFINITY);
-        for (i, four) in range.clone().zip(&self.fours[range]) {
-            let squares = four.distances_squared(p);
-            // Rarely so, after the first.
-            if squares.cmplt(Vec4::splat(least)).any() {
-                for (lane, squared) in (4 * i..).zip(squares.to_array()) {
-                    if squared < least {
-                        (nearest, least) = (lane, squared);
-                    }
+        let mut nearest = (4 * range.start as u32, f32::INFINITY);
+        let mut number = nearest.0;
+        for four in &self.fours[range] {
+            for distance_squared in four.distances_squared(p).to_array() {
+                if distance_squared < nearest.1 {
+                    nearest = (number, distance_squared);
                 }
+                number += 1;
             }
         }
-        (nearest as u32, least)
+        nearest
     }
 
     /// Squared distance to the nearest triangle, or any value up to `enough` once one has been found that near. Of many

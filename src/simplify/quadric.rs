@@ -7,9 +7,7 @@
 //! The origin is the vertex that carries the form, not the origin of object space. All planes of a vertex pass
 //! close by it, so `b` and `c` stay small and nothing cancels: single precision is enough.
 
-use glam::{Vec3, Vec4};
-
-use super::lanes::{self, Lanes};
+use glam::Vec3;
 
 /// A quadratic form around the vertex that carries it.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
@@ -52,20 +50,6 @@ impl Quadric {
         }
         // Rounding can leave a sum of squares a little below zero.
         if self.area > 0.0 { sum.max(0.0) / self.area } else { sum.max(0.0) }
-    }
-
-    /// The [`error`](Self::error) of four points, to the same bits.
-    pub fn errors(&self, d: Lanes) -> Vec4 {
-        let (q, o, b) = (self.diagonal, self.off_diagonal, 2.0 * self.b);
-        let gradient = [
-            d[0] * q.x + d[1] * o.z + d[2] * o.y + b.x,
-            d[0] * o.z + d[1] * q.y + d[2] * o.x + b.y,
-            d[0] * o.y + d[1] * o.x + d[2] * q.z + b.z,
-        ];
-        let sum = lanes::dot(d, gradient) + self.c;
-        let errors = Vec4::select(sum.cmpgt(Vec4::ZERO), sum, Vec4::ZERO);
-        let errors = if self.area > 0.0 { errors / self.area } else { errors };
-        Vec4::select(sum.is_nan_mask(), Vec4::INFINITY, errors)
     }
 
     /// Adds the form carried by another vertex, from which this one's lies at `d`.
