@@ -235,11 +235,13 @@ impl Front {
         }
     }
 
-    /// Appends the pairs of the nodes linked below a node to `below`. One pair is the rule, and not worth a call.
+    /// Appends the pairs of the nodes linked below a node to `below`, which will be looked at soon. One pair is the rule, and
+    /// not worth a call.
     #[inline(always)]
     pub(crate) fn descend(&self, record: &Record, below: &mut Vec<u32>) {
         if record.children == 0 {
         } else if record.status & MANY == 0 {
+            prefetch(&self.pairs, record.children as usize);
             below.push(record.children);
         } else {
             below.extend_from_slice(self.below(record));

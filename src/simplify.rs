@@ -45,6 +45,7 @@ use std::time::{Duration, Instant};
 use glam::{DVec3, Vec3};
 use vertex_tree::{Collapse, CollapseLog, Georeference, LogError, Mesh};
 
+use crate::parallel;
 use crate::progress::Progress;
 pub use out_of_core::{LEAST_MEMORY, Limits, MOST_THREADS, OutOfCoreError, build_within};
 pub use remains::Remains;
@@ -163,13 +164,17 @@ pub fn build(mesh: Mesh, options: &Options, progress: Progress) -> Result<(Colla
     drop(given);
     let leaf_radius = leaf_radii(mesh, &number);
     let mut surface = Surface::new(positions, &coherent_triangles(&mesh.triangles, &number), unit);
-    let mut marks = Marks::new(order.len());
-    let mut neighbours = Vec::new();
-    for i in 0..surface.live.len() {
-        set_initial_quadric(surface.live[i], &mut surface, &mut marks, &mut neighbours);
+    let quadrics = parallel::map_chunks(surface.live.len(), AT_ONCE, |range| {
+        let (mut marks, mut neighbours) = (Marks::new(order.len()), Vec::new());
+        let quadric = |&v: &u32| initial_quadric(v, &surface, &mut marks, &mut neighbours);
+        surface.live[range].iter().map(quadric).collect::<Vec<_>>()
+    });
+    for (i, (quadric, special)) in quadrics.into_iter().flatten().enumerate() {
+        let v = surface.live[i] as usize;
+        (surface.quadrics[v], surface.special[v]) = (quadric, special);
     }
     let nodes = Nodes::new(leaf_radius, extent, unit);
-    let mut builder = Builder::new(surface, nodes, marks, options.merge_components);
+    let mut builder = Builder::new(surface, nodes, Marks::new(order.len()), options.merge_components);
     builder.begin();
     let preparation = start.elapsed();
 
@@ -244,6 +249,9 @@ fn sequence(keys: &[f32], rounds: &[(Range<u32>, f32)]) -> (Vec<u32>, Vec<Round>
     (sequence, done, inversions)
 }
 
+/// Vertices that a thread prepares at once.
+const AT_ONCE: usize = 1 << 15;
+
 /// Weight of a plane that holds a boundary edge in place, per squared length of the edge.
 const BOUNDARY_WEIGHT: f64 = 4.0;
 
@@ -298,11 +306,16 @@ fn coherent_triangles(triangles: &[[u32; 3]], number: &[u32]) -> Vec<[u32; 3]> {
     ordered
 }
 
-/// Gives `v` the planes of the triangles around it, weighted by area, and at edges that do not join exactly two triangles
-/// a plane through the edge, upright on the triangle. Also finds whether the vertex has such edges.
-fn set_initial_quadric(v: u32, surface: &mut Surface, marks: &mut Marks, neighbours: &mut Vec<Neighbour>) {
+/// The planes of the triangles around `v`, weighted by area, and at edges that do not join exactly two triangles a plane
+/// through the edge, upright on the triangle. Also whether the vertex has [such edges](Surface::special).
+fn initial_quadric(
+    v: u32,
+    surface: &Surface,
+    marks: &mut Marks,
+    neighbours: &mut Vec<Neighbour>,
+) -> (Quadric, bool) {
     let unit = surface.unit;
-    let mut quadric = Quadric::default();
+    let (mut quadric, mut special) = (Quadric::default(), false);
     // In double precision no product of four lengths vanishes or overflows.
     let area = 0.5 / (unit * unit);
     for spoke in surface.spokes(v) {
@@ -316,7 +329,7 @@ fn set_initial_quadric(v: u32, surface: &mut Surface, marks: &mut Marks, neighbo
     }
     if !surface.is_surrounded(v) {
         surface.neighbours(v, marks, neighbours);
-        surface.special[v as usize] = neighbours.iter().any(|n| !n.is_regular());
+        special = neighbours.iter().any(|n| !n.is_regular());
         marks.clear();
         for n in neighbours.iter().filter(|n| n.triangles != 2) {
             marks.set(n.vertex, 0);
@@ -330,5 +343,5 @@ fn set_initial_quadric(v: u32, surface: &mut Surface, marks: &mut Marks, neighbo
             }
         }
     }
-    surface.quadrics[v as usize] = quadric;
+    (quadric, special)
 }

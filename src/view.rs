@@ -39,6 +39,7 @@ pub struct View {
     cos_beta: f64,
     sin_beta: f64,
     k: f64,
+    is_ordinary: bool,
 }
 
 impl View {
@@ -89,7 +90,9 @@ impl View {
         k: f64,
     ) -> Result<Self, ViewError> {
         check_cone(cos_beta, sin_beta)?;
-        Ok(Self { eye: check_eye(eye)?, direction: unit(direction)?, cos_beta, sin_beta, k: check_k(k)? })
+        let is_ordinary = 8.0 * sin_beta >= cos_beta && sin_beta <= 8.0 * cos_beta;
+        let (eye, direction, k) = (check_eye(eye)?, unit(direction)?, check_k(k)?);
+        Ok(Self { eye, direction, cos_beta, sin_beta, k, is_ordinary })
     }
 
     /// Eye position: in world coordinates for an engine, in those of the spheres for the criterion.
@@ -118,6 +121,13 @@ impl View {
     #[must_use]
     pub fn sin_beta(&self) -> f64 {
         self.sin_beta
+    }
+
+    /// Whether the cone's half-angle is from 7.2 to 82.8 degrees, with tangents from 1/8 to 8. Then it makes no difference how
+    /// far from the axis a centre is whose direction is within a sixteenth of it: see [`criterion`](crate::criterion).
+    #[inline(always)]
+    pub(crate) fn is_ordinary(&self) -> bool {
+        self.is_ordinary
     }
 
     /// `1 / (tan(fov_y / 2) theta)`, at least 1 and finite: how many times its own size away a length may be before it

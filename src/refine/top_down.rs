@@ -30,12 +30,14 @@ impl TopDown {
         self.stack.clear();
         self.stack.extend_from_slice(front.root_pairs());
         while let Some(pair) = self.stack.pop() {
-            for (side, record) in (0..).zip(front.pair(pair)) {
+            let records = front.pair(pair);
+            // What is below both first, so that it comes while they are tested.
+            records.iter().for_each(|record| front.descend(record, &mut self.stack));
+            for (side, record) in (0..).zip(records) {
                 if record.node.0 == NONE {
                     continue;
                 }
                 flips.tests += 1;
-                front.descend(record, &mut self.stack);
                 let slot = Slot(2 * pair + side);
                 let (wanted, active) = (unfold(slot, &record.bounds), record.is_active());
                 if wanted != active && !record.is_waiting() {

@@ -60,11 +60,19 @@ pub(super) struct Candidates {
     pub parity: Parity,
     /// Whether anything has become known in the round that was not before.
     pub changed: bool,
-    /// The neighbours of one vertex.
-    neighbours: Vec<Neighbour>,
-    /// Edges of one vertex with their keys.
-    edges: Vec<(f32, u32)>,
+    edges: Edges,
 }
+
+/// The edges of one vertex along which it may be removed.
+#[derive(Debug, Default)]
+pub(super) struct Edges {
+    neighbours: Vec<Neighbour>,
+    /// With their keys.
+    list: Vec<(f32, u32)>,
+}
+
+/// The cheapest edge of a vertex, as far as its own star can say, and whether it is [special](Surface::special).
+pub(super) type Cheapest = (Option<(f32, u32)>, bool);
 
 /// Triangles that may be looked at to find a legal edge of one vertex: of one with thousands not all edges are tried, but the
 /// cheapest, and again when it has lost some.
@@ -78,8 +86,7 @@ impl Candidates {
             state: vec![State::Outdated(Parity::Odd); count],
             parity: Parity::Even,
             changed: false,
-            neighbours: Vec::new(),
-            edges: Vec::new(),
+            edges: Edges::default(),
         }
     }
 
@@ -107,25 +114,15 @@ impl Candidates {
         self.changed = true;
     }
 
-    /// Vector from one vertex to another, in units of the simplification.
-    fn way(&self, from: u32, to: u32, surface: &Surface) -> Vec3 {
-        (surface.position(to) - surface.position(from)) * surface.per_unit
-    }
-
     /// Finds the cheapest edge of `v`.
     pub fn refresh(&mut self, v: u32, surface: &mut Surface, marks: &mut Marks) {
-        if surface.special[v as usize] {
-            self.find_edges(v, surface, marks);
-            let cheapest = self.edges.iter().copied().reduce(cheaper);
-            self.set(v, cheapest, State::Cheapest);
-            return;
-        }
-        // Triangles close up around `v`, so every neighbour comes next in one of them.
-        let quadric = &surface.quadrics[v as usize];
-        let neighbours = surface.spokes(v).map(|s| (edge_key(quadric, self.way(v, s.next, surface)), s.next));
-        let partners = surface.virtual_edges.partners(v);
-        let partners = partners.map(|w| (virtual_key(quadric, self.way(v, w, surface)), w));
-        let cheapest = neighbours.chain(partners).reduce(cheaper);
+        let cheapest = self.edges.cheapest(v, surface, marks);
+        self.take(v, cheapest, surface);
+    }
+
+    /// Takes what has been found for `v`.
+    pub fn take(&mut self, v: u32, (cheapest, special): Cheapest, surface: &mut Surface) {
+        surface.special[v as usize] = special;
         self.set(v, cheapest, State::Cheapest);
     }
 
@@ -138,40 +135,21 @@ impl Candidates {
         force: bool,
         mut is_legal: impl FnMut(u32, &Surface, &mut Marks) -> bool,
     ) {
-        self.find_edges(v, surface, marks);
-        self.edges.sort_unstable_by(|a, b| a.0.total_cmp(&b.0).then(a.1.cmp(&b.1)));
+        surface.special[v as usize] = self.edges.find(v, surface, marks);
+        let Edges { neighbours, list } = &mut self.edges;
+        list.sort_unstable_by(|a, b| a.0.total_cmp(&b.0).then(a.1.cmp(&b.1)));
         let most = MOST_LOOKED_AT / surface.star_length(v).max(1);
-        let legal = self.edges.iter().copied().take(most.max(4)).find(|&(_, u)| is_legal(u, surface, marks));
+        let legal = list.iter().copied().take(most.max(4)).find(|&(_, u)| is_legal(u, surface, marks));
         if legal.is_some() || !force {
             self.set(v, legal, State::Legal);
             return;
         }
-        let neighbours = self.neighbours.iter().map(|n| n.vertex);
+        let neighbours = neighbours.iter().map(|n| n.vertex);
         let shortest = neighbours
             .chain(surface.virtual_edges.partners(v))
-            .map(|u| (self.way(v, u, surface).length_squared().min(f32::MAX), u))
+            .map(|u| (way(v, u, surface).length_squared().min(f32::MAX), u))
             .reduce(cheaper);
         self.set(v, shortest, State::Forced);
-    }
-
-    /// Finds all edges along which `v` may be removed as far as its own star can say.
-    fn find_edges(&mut self, v: u32, surface: &mut Surface, marks: &mut Marks) {
-        surface.neighbours(v, marks, &mut self.neighbours);
-        surface.special[v as usize] = self.neighbours.iter().any(|n| !n.is_regular());
-        // A vertex on a boundary, or on a seam where more than two triangles meet, stays on it.
-        let is_bound = self.neighbours.iter().any(|n| n.triangles != 2);
-        let mut edges = std::mem::take(&mut self.edges);
-        let quadric = &surface.quadrics[v as usize];
-        edges.clear();
-        for n in &self.neighbours {
-            if !is_bound || n.triangles != 2 || surface.joined[v as usize] {
-                edges.push((edge_key(quadric, self.way(v, n.vertex, surface)), n.vertex));
-            }
-        }
-        for w in surface.virtual_edges.partners(v) {
-            edges.push((virtual_key(quadric, self.way(v, w, surface)), w));
-        }
-        self.edges = edges;
     }
 
     /// Brings the candidate of `w` up to date after its neighbour `lost` has merged into `gained`.
@@ -183,7 +161,7 @@ impl Candidates {
             return;
         }
         // The other edges of `w` are what they were.
-        let key = edge_key(&surface.quadrics[i], self.way(w, gained, surface));
+        let key = edge_key(&surface.quadrics[i], way(w, gained, surface));
         (self.key[i], self.target[i]) = cheaper((self.key[i], self.target[i]), (key, gained));
         self.state[i] = State::Updated(self.parity);
     }
@@ -201,6 +179,46 @@ impl Candidates {
         self.state[i] = if candidate.is_some() { state } else { State::Nothing };
         self.changed = true;
     }
+}
+
+impl Edges {
+    /// Finds the cheapest edge of `v`.
+    pub fn cheapest(&mut self, v: u32, surface: &Surface, marks: &mut Marks) -> Cheapest {
+        if surface.special[v as usize] {
+            let special = self.find(v, surface, marks);
+            return (self.list.iter().copied().reduce(cheaper), special);
+        }
+        // Triangles close up around `v`, so every neighbour comes next in one of them.
+        let quadric = &surface.quadrics[v as usize];
+        let neighbours = surface.spokes(v).map(|s| (edge_key(quadric, way(v, s.next, surface)), s.next));
+        let partners = surface.virtual_edges.partners(v);
+        let partners = partners.map(|w| (virtual_key(quadric, way(v, w, surface)), w));
+        (neighbours.chain(partners).reduce(cheaper), false)
+    }
+
+    /// Finds all edges along which `v` may be removed as far as its own star can say, and whether it is special.
+    fn find(&mut self, v: u32, surface: &Surface, marks: &mut Marks) -> bool {
+        let Self { neighbours, list } = self;
+        surface.neighbours(v, marks, neighbours);
+        // A vertex on a boundary, or on a seam where more than two triangles meet, stays on it.
+        let is_bound = neighbours.iter().any(|n| n.triangles != 2);
+        let quadric = &surface.quadrics[v as usize];
+        list.clear();
+        for n in &*neighbours {
+            if !is_bound || n.triangles != 2 || surface.joined[v as usize] {
+                list.push((edge_key(quadric, way(v, n.vertex, surface)), n.vertex));
+            }
+        }
+        for w in surface.virtual_edges.partners(v) {
+            list.push((virtual_key(quadric, way(v, w, surface)), w));
+        }
+        neighbours.iter().any(|n| !n.is_regular())
+    }
+}
+
+/// Vector from one vertex to another, in units of the simplification.
+fn way(from: u32, to: u32, surface: &Surface) -> Vec3 {
+    (surface.position(to) - surface.position(from)) * surface.per_unit
 }
 
 /// Keys are finite; infinity stands for no edge.

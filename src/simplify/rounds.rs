@@ -18,7 +18,8 @@ use std::ops::Range;
 use glam::Vec3;
 use vertex_tree::NONE;
 
-use super::candidates::{Candidates, State};
+use super::AT_ONCE;
+use super::candidates::{Candidates, Edges, State};
 use super::key_counts::KeyCounts;
 use super::legality::obstacle;
 use super::marks::Marks;
@@ -28,6 +29,7 @@ use super::remains::Remains;
 use super::samples::Samples;
 use super::stall::Stall;
 use super::surface::{Spoke, Surface};
+use crate::parallel;
 
 /// How a measured distance counts against keys that are not measured: with this times its square. Keys are mean squared
 /// distances, less than the square of the largest. With 1, only the worst surprises are put off, at the cost of 7 %
@@ -94,9 +96,14 @@ impl Builder {
 
     /// Finds every vertex's first candidate.
     pub fn begin(&mut self) {
-        for i in 0..self.surface.live.len() {
-            let v = self.surface.live[i];
-            self.candidates.refresh(v, &mut self.surface, &mut self.marks);
+        let surface = &self.surface;
+        let first = parallel::map_chunks(surface.live.len(), AT_ONCE, |range| {
+            let (mut edges, mut marks) = (Edges::default(), Marks::new(surface.merged_into.len()));
+            let cheapest = |&v: &u32| edges.cheapest(v, surface, &mut marks);
+            surface.live[range].iter().map(cheapest).collect::<Vec<_>>()
+        });
+        for (i, first) in first.into_iter().flatten().enumerate() {
+            self.candidates.take(self.surface.live[i], first, &mut self.surface);
         }
     }
 

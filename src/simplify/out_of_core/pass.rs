@@ -18,7 +18,7 @@ use super::super::key_counts::KeyCounts;
 use super::super::order::PIECES;
 use super::super::remains::Remains;
 use super::super::rounds::Builder;
-use super::super::{leaf_radius, set_initial_quadric};
+use super::super::{initial_quadric, leaf_radius};
 use super::blocks::Blocks;
 use super::log::Log;
 use super::passes::check;
@@ -148,7 +148,9 @@ impl Pass<'_> {
                         let v = v as u32;
                         let squared = farthest(builder, v);
                         builder.nodes.leaf_radius[v as usize] = leaf_radius(squared);
-                        set_initial_quadric(v, &mut builder.surface, &mut builder.marks, &mut neighbours);
+                        let Builder { surface, marks, .. } = &mut *builder;
+                        let (quadric, special) = initial_quadric(v, surface, marks, &mut neighbours);
+                        (surface.quadrics[v as usize], surface.special[v as usize]) = (quadric, special);
                         builder.candidates.refresh(v, &mut builder.surface, &mut builder.marks);
                     }
                 }
