@@ -42,6 +42,12 @@ pub struct View {
     is_ordinary: bool,
 }
 
+/// Whether a half-angle is from 7.2 to 82.8 degrees, with tangents from 1/8 to 8. Then it makes no difference how far from the
+/// axis a centre is whose direction is within a sixteenth of it: see [`criterion`](crate::criterion).
+fn is_ordinary(cos_beta: f64, sin_beta: f64) -> bool {
+    8.0 * sin_beta >= cos_beta && sin_beta <= 8.0 * cos_beta
+}
+
 impl View {
     /// The largest that a coordinate of an eye or of an origin may be. Squares of distances do not overflow then, and
     /// the spheres of nodes end at 3.4e38.
@@ -90,9 +96,8 @@ impl View {
         k: f64,
     ) -> Result<Self, ViewError> {
         check_cone(cos_beta, sin_beta)?;
-        let is_ordinary = 8.0 * sin_beta >= cos_beta && sin_beta <= 8.0 * cos_beta;
         let (eye, direction, k) = (check_eye(eye)?, unit(direction)?, check_k(k)?);
-        Ok(Self { eye, direction, cos_beta, sin_beta, k, is_ordinary })
+        Ok(Self { eye, direction, cos_beta, sin_beta, k, is_ordinary: is_ordinary(cos_beta, sin_beta) })
     }
 
     /// Eye position: in world coordinates for an engine, in those of the spheres for the criterion.
@@ -123,8 +128,7 @@ impl View {
         self.sin_beta
     }
 
-    /// Whether the cone's half-angle is from 7.2 to 82.8 degrees, with tangents from 1/8 to 8. Then it makes no difference how
-    /// far from the axis a centre is whose direction is within a sixteenth of it: see [`criterion`](crate::criterion).
+    /// Whether the cone is neither narrow nor wide: see [`is_ordinary`].
     #[inline(always)]
     pub(crate) fn is_ordinary(&self) -> bool {
         self.is_ordinary
@@ -160,7 +164,7 @@ impl View {
     /// [`ViewError::Cone`].
     pub fn with_cone(self, cos_beta: f64, sin_beta: f64) -> Result<Self, ViewError> {
         check_cone(cos_beta, sin_beta)?;
-        Ok(Self { cos_beta, sin_beta, ..self })
+        Ok(Self { cos_beta, sin_beta, is_ordinary: is_ordinary(cos_beta, sin_beta), ..self })
     }
 
     /// The same view with another [`k`](Self::k).
@@ -213,6 +217,6 @@ impl View {
     /// What no constructor makes, to see what comes of it.
     #[cfg(test)]
     pub(crate) fn unchecked(eye: DVec3, direction: DVec3, cos_beta: f64, sin_beta: f64, k: f64) -> Self {
-        Self { eye, direction, cos_beta, sin_beta, k }
+        Self { eye, direction, cos_beta, sin_beta, k, is_ordinary: is_ordinary(cos_beta, sin_beta) }
     }
 }

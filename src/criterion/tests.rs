@@ -14,11 +14,12 @@ fn either_way_of_finding_the_distance_from_the_axis_decides_alike() {
         let mut unit = || random.random_range(-1.0..1.0_f64);
         let direction = DVec3::new(unit(), unit(), unit()).normalize();
         let across = direction.cross(DVec3::new(unit(), unit(), unit())).normalize();
-        let tan = [1e-6, 0.1, 0.126, 1.0, 7.9, 8.1, 1e6][trial % 7];
+        let tan = [1e-6_f64, 0.1, 0.126, 1.0, 7.9, 8.1, 1e6][trial % 7];
         let (cos, sin) = (1.0 / (1.0 + tan * tan).sqrt(), tan / (1.0 + tan * tan).sqrt());
         let eye = DVec3::new(unit(), unit(), unit()) * [0.0, 1.0, 1e3][trial / 7 % 3];
         let view = View::from_parts(eye, direction, cos, sin, 1e9).unwrap();
         assert_eq!(view.is_ordinary(), (0.125..=8.0).contains(&tan));
+        assert_eq!(View::from_parts(eye, direction, 0.6, 0.8, 1e9).unwrap().with_cone(cos, sin), Ok(view));
         // At the axis, about a sixteenth off it, at the cone's edge, anywhere.
         let off = [1e-9, 1e-3, 0.0625, tan, 2.0 * unit().abs()][trial / 21 % 5] * (1.0 + 1e-6 * unit());
         let ahead = unit();

@@ -1,4 +1,5 @@
-//! `docs/papers.md` names files and tests that are there.
+//! What documents say of this repository is true: `docs/papers.md` names files and tests that are there, and every record of a
+//! measurement names a command, and is in the list of records.
 
 use std::collections::HashSet;
 use std::fs;
@@ -104,4 +105,64 @@ fn what_is_not_there_is_found() {
     assert_eq!(rows, 6);
     let words: Vec<&str> = missing.iter().map(|line| line.split(':').next().unwrap()).collect();
     assert_eq!(words, ["b", "c", "d", "e", "a cell"], "{missing:?}");
+}
+
+/// What is wrong with the records of measurements, given their names and texts, and with the list of them.
+fn wrong_records(list: &str, records: &[(String, String)]) -> Vec<String> {
+    let mut wrong = Vec::new();
+    for (name, text) in records {
+        if !list.contains(&format!("({name})")) {
+            wrong.push(format!("{name} is not in the list"));
+        }
+        let commands = ["cargo bench", "cargo test", "cargo run", "foldfront "];
+        if !commands.iter().any(|command| text.contains(command)) {
+            wrong.push(format!("{name} names no command"));
+        }
+    }
+    for link in list.split("](").skip(1).filter_map(|rest| rest.split(')').next()) {
+        if !records.iter().any(|(name, _)| name == link) {
+            wrong.push(format!("{link} is not there"));
+        }
+    }
+    wrong
+}
+
+#[test]
+fn every_record_is_in_the_list_and_names_a_command() {
+    let folder = Path::new(ROOT).join("benches/record");
+    let mut records = Vec::new();
+    for entry in fs::read_dir(&folder).unwrap() {
+        let path = entry.unwrap().path();
+        let name = path.file_name().unwrap().to_str().unwrap().to_owned();
+        if name.ends_with(".md") && name != "README.md" {
+            records.push((name, fs::read_to_string(&path).unwrap()));
+        }
+    }
+    let list = fs::read_to_string(folder.join("README.md")).unwrap();
+    assert_eq!(wrong_records(&list, &records), Vec::<String>::new());
+    assert!(records.len() > 5);
+}
+
+#[test]
+fn a_record_without_a_command_is_found() {
+    let record = |name: &str, text: &str| (name.to_owned(), text.to_owned());
+    let records =
+        [record("a.md", "`cargo bench`: 3 s"), record("b.md", "3 s"), record("c.md", "`foldfront build`")];
+    let wrong = wrong_records("[a](a.md) [b](b.md) [d](d.md)", &records);
+    assert_eq!(wrong, ["b.md names no command", "c.md is not in the list", "d.md is not there"]);
+}
+
+#[test]
+fn links_of_documents_lead_somewhere() {
+    let mut broken = Vec::new();
+    for document in ["README.md", "DESIGN.md", "CHANGELOG.md", "docs/papers.md", "benches/record/README.md"] {
+        let path = Path::new(ROOT).join(document);
+        let text = fs::read_to_string(&path).unwrap();
+        for link in text.split("](").skip(1).filter_map(|rest| rest.split([')', '#']).next()) {
+            if !link.is_empty() && !link.contains("://") && !path.parent().unwrap().join(link).exists() {
+                broken.push(format!("{document}: {link}"));
+            }
+        }
+    }
+    assert_eq!(broken, Vec::<String>::new());
 }
