@@ -46,6 +46,10 @@ impl Pager {
         if std::mem::take(&mut slot.ahead) {
             self.stats.ahead_used += 1;
         }
+        // In the paper a page is what its counts make of it.
+        if self.is_printed() {
+            return;
+        }
         self.classify(self.holders[holder as usize].page);
         if let Some(class) = self.lists.class(holder) {
             self.lists.push(holder, class);
@@ -110,7 +114,7 @@ impl Pager {
             return;
         }
         let untouched = self.holders[holder as usize].touched == 0;
-        let stays = self.in_use == InUse::Stays && self.usage[page as usize] > 0;
+        let stays = self.in_use != InUse::Yields && self.usage[page as usize] > 0;
         let class = match (self.usage[page as usize], self.references[page as usize]) {
             _ if !stays && self.foresight.is_foreseen(page) => Class::Foreseen,
             (0, 0) => Class::Free,
