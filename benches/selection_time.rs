@@ -147,7 +147,8 @@ fn open(place: &Place) -> Option<(CollapseLog, Vec<Path>)> {
             }
             let mesh = mesh_io::read(&[mesh], quiet).expect("the data are readable");
             // A city is thousands of buildings; a terrain is one piece.
-            let options = simplify::Options { merge_components: *mode == Mode::Walk };
+            let mut options = simplify::Options::default();
+            options.merge_components = *mode == Mode::Walk;
             let (log, _) = simplify::build(mesh, &options, quiet).expect("the data are meshes");
             let options = import::Options { mode: *mode, ..import::Options::default() };
             let walk = import::import(&trajectory, &log.mesh, &options).expect("a trajectory");

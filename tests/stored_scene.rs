@@ -1,5 +1,7 @@
 //! Scene files whose objects are of any backend: replayed, checked against brute force, and damaged.
 
+#![expect(clippy::disallowed_methods, reason = "random shapes and motions, or figures to compare with")]
+
 mod common;
 #[path = "cli/workplace.rs"]
 #[allow(dead_code)]
@@ -345,6 +347,28 @@ fn the_command_line_replays_all_kinds() {
         &["all.scene", "line 2", "in-memory"],
     );
     place.fail("compare all.scene --path descent.path --prefetch printed", 2, &["printed", "meta-node"]);
+    // Two buildings a stone's throw apart are one where that is asked for, in a scene as elsewhere.
+    let house = "v 0 0 0\nv 1 0 0\nv 0 1 0\nv 0 0 1\nv 3 0 0\nv 4 0 0\nv 3 1 0\nv 3 0 1\n";
+    let faces: String = [0, 4]
+        .map(|at| {
+            format!(
+                "f {0} {2} {1}\nf {0} {1} {3}\nf {1} {2} {3}\nf {2} {0} {3}\n",
+                at + 1,
+                at + 2,
+                at + 3,
+                at + 4
+            )
+        })
+        .concat();
+    place.write("houses.obj", format!("{house}{faces}"));
+    place.write("houses.scene", "houses.obj 1 0 0 0 0 1 0 0 0 0 1 0\n");
+    let coarsest = |joined: &str| {
+        place.succeed(&format!(
+            "compare houses.scene --path descent.path --frames 0..1 --pixels 2000 --strategy event {joined} --out houses"
+        ));
+        rows("houses")[0][18].clone()
+    };
+    assert_ne!(coarsest(""), coarsest("--merge-components"));
     place.write("meta.scene", "grid.meta-node 1 0 0 0 0 1 0 0 0 0 1 0\n");
     place.succeed(
         "compare meta.scene --path descent.path --backend meta-node --prefetch printed --check --out printed",

@@ -167,7 +167,8 @@ fn objects(
     if walks.is_empty() {
         bail!("{}: a scene of several objects needs a --path", file.display());
     }
-    let scene = stage(&format!("{name}: opening"), |_| StoredScene::open(file))?;
+    let options_of_meshes = simplify::Options { merge_components: command.merge_components };
+    let scene = stage(&format!("{name}: opening"), |_| StoredScene::open_with(file, &options_of_meshes))?;
     for object in scene.objects() {
         let own = scene.files()[object.file].backend();
         if let Some(other) = command.backend.iter().find(|&&backend| backend != own) {

@@ -12,7 +12,7 @@ use crate::store::Backend;
 ///
 /// * [`Blocking`](Self::Blocking) is what DeCoro & Pajarola (2002, section 4.1) and Holst & Schumann (2007, section 4) print: the
 ///   traversal loads what it comes upon and goes on when it is there. Time passes and the path does not; no page is
-///   missed.
+///   missed, unless memory can not hold what the cut takes.
 /// * [`Printed`](Self::Printed) is what El-Sana & Chiang (2000, section 3.3) print, to the letter: the change is given up for
 ///   now, pages in use are never evicted, and three place holders are kept from switching down
 ///   ([`InUse::Printed`](meta_node::InUse::Printed)).

@@ -152,6 +152,14 @@ impl StoredScene {
     /// # Errors
     /// What can not be read, with the line that names it.
     pub fn open(path: &Path) -> Result<Self, StoredSceneError> {
+        Self::open_with(path, &simplify::Options::default())
+    }
+
+    /// The same, with options for what is simplified.
+    ///
+    /// # Errors
+    /// As for [`open`](Self::open).
+    pub fn open_with(path: &Path, options: &simplify::Options) -> Result<Self, StoredSceneError> {
         let mut scene = Self { files: Vec::new(), objects: Vec::new() };
         let mut known: FxHashMap<PathBuf, usize> = FxHashMap::default();
         for (line, file, placement) in read_lines(path)? {
@@ -159,7 +167,7 @@ impl StoredScene {
             let number = match known.get(&file) {
                 Some(&number) => number,
                 None => {
-                    scene.files.push(open(&at)?);
+                    scene.files.push(open(&at, options)?);
                     known.insert(file, scene.files.len() - 1);
                     scene.files.len() - 1
                 }
@@ -349,7 +357,7 @@ fn place<T: VertexTree + 'static>(
 }
 
 /// Opens the file of an object.
-fn open(at: &ObjectLine) -> Result<Store, StoredSceneError> {
+fn open(at: &ObjectLine, options: &simplify::Options) -> Result<Store, StoredSceneError> {
     let wrong = |source| StoredSceneError::File { at: Box::new(at.clone()), source };
     match Store::open(&at.file) {
         Err(StoreError::Foreign { .. }) => {}
@@ -357,7 +365,7 @@ fn open(at: &ObjectLine) -> Result<Store, StoredSceneError> {
     }
     let mesh = mesh_io::read(&[&at.file], &mut |_, _| ());
     let mesh = mesh.map_err(|source| StoredSceneError::Mesh { at: Box::new(at.clone()), source })?;
-    let built = simplify::build(mesh, &simplify::Options::default(), &mut |_, _| ());
+    let built = simplify::build(mesh, options, &mut |_, _| ());
     let (log, _) = built.map_err(|source| StoredSceneError::Build { at: Box::new(at.clone()), source })?;
     Store::in_memory(Arc::new(log)).map_err(wrong)
 }

@@ -302,6 +302,41 @@ mod tests {
         assert_eq!(fold(&sphere(10.0, beta + 0.2, 2.0, 100.0), 0.001, 0.1), 1.0);
     }
 
+    /// What is left out where it does not decide is not missed: the formulas as they stand, over all sorts of spheres.
+    #[test]
+    fn times_are_those_of_the_formulas() {
+        let view = view(0.01);
+        let beta = libm::atan2(view.sin_beta(), view.cos_beta());
+        let (rho, omega) = (0.25, 0.02);
+        let mut decided = [0; 6];
+        for case in 0..40_000_u32 {
+            // Steps that have nothing to do with each other: all combinations come up.
+            let part = |step: f64| (f64::from(case) * step).fract();
+            let (distance, angle) = (0.5 + 60.0 * part(0.618_033_988_7), 0.01 + 3.1 * part(0.414_213_562_3));
+            let bounds = sphere(distance, angle, 8.0 * part(0.732_050_807_5), 0.2 * part(0.236_067_977_4));
+            let center = DVec3::from(bounds.center.map(f64::from));
+            let (d, r) = (center.length(), f64::from(bounds.radius));
+            let reach = Criterion::ScreenError.reach_distance(&bounds, view.k());
+            let (phi, alpha) = (libm::asin((r / d).min(1.0)), libm::acos(center.x / d));
+            let times = [(d - r) / rho, (alpha - phi - beta) / omega, (d - reach) / rho];
+            for kind in [Kind::Unfold, Kind::Fold] {
+                let [inside, visible, coarse] = times.map(|t| if kind == Kind::Unfold { t } else { -t });
+                let t = match kind {
+                    Kind::Unfold => inside.min(visible.max(coarse)),
+                    Kind::Fold => inside.max(visible.min(coarse)),
+                };
+                let got = until(&[view], kind, &bounds, rho, omega).max(1.0);
+                assert!(
+                    got == t.ceil().max(1.0) || (t - t.round()).abs() < 1e-6,
+                    "{kind:?}, {bounds:?}: {got}, {t}"
+                );
+                let which = [inside, visible, coarse].iter().position(|&x| x == t).unwrap_or(0);
+                decided[which + if kind == Kind::Fold { 3 } else { 0 }] += u32::from(t > 1.0);
+            }
+        }
+        assert!(decided.iter().all(|&count| count > 100), "{decided:?}");
+    }
+
     #[test]
     fn the_first_view_unfolds_and_the_last_folds() {
         let (near, far) = (view(0.01), view(0.02));
