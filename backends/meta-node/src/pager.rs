@@ -33,7 +33,7 @@
 //! * K place holders, each of the size of the largest page: memory for a quarter of the file holds fewer than a quarter of the pages.
 //! * Root pages are pages like others: they stay while they are in use or referred to.
 //! * What is prefetched are the pages above and below those in use, and nothing else. It takes the first place of the free
-//!   list. Where there is none it is given up for good: only an urgent request asks again.
+//!   list. Where there is none it is given up: only another reference, or an urgent request, asks again.
 //! * An urgent request takes the first of the free list, or else the first that is only prefetched, whether
 //!   or not that has just come; pages in use never make room, for switching up neither, since one that is not in use is always left.
 //! * A switch down to a page takes that page: a node with children on other pages is unfolded only when these are there. The

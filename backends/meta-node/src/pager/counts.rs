@@ -96,11 +96,13 @@ impl Pager {
         for page in parent.into_iter().chain(first_child..first_child + children) {
             let count = &mut self.references[page as usize];
             *count = if in_use { *count + 1 } else { count.saturating_sub(1) };
-            if *count == u16::from(in_use) {
+            let is_first = *count == u16::from(in_use);
+            if is_first {
                 self.classify(page);
-                if in_use {
-                    self.prefetch(page);
-                }
+            }
+            // In the paper every reference to a page that is not there asks for it.
+            if in_use && (is_first || self.is_printed()) {
+                self.prefetch(page);
             }
         }
         self.guarded = guarded;

@@ -141,7 +141,7 @@ impl Pager {
         }
     }
 
-    /// Leaves a page for later. In the paper it is left for good.
+    /// Leaves a page for later. In the paper it is left until something refers to it anew.
     pub(super) fn give_up(&mut self, page: u32) {
         if self.is_printed() {
             return;
