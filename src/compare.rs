@@ -4,6 +4,12 @@
 //! frame by frame; what remains is what it can not do in the memory that it has. In real time the clock runs instead, and
 //! a page that has not come is a miss: on virtual time with a simulated store, so that a replay can be repeated, or by the
 //! wall clock with the store that is there. See [`Pace`]. A viewer waits for the first frame, so that is settled too.
+//! How pages are loaded ([`Loading`]) is a matter of its own: with [`Loading::Blocking`] changes wait in real time as well, the
+//! clock runs on while they do, and the path does not.
+//!
+//! `stall_ns` is what changes have waited for the store. On virtual time only `blocking` waits, and it is virtual time, the
+//! same in every replay. In a settled replay all wait, whatever the way to load: it is the real time that reading took, a part of
+//! `select_ns`.
 //!
 //! Each strategy replays the path alone, from the base mesh on, with the displayed mesh kept as a renderer would;
 //! nothing else runs between its frames, and the first frame, which unfolds the whole cut, counts like any other.
@@ -12,6 +18,7 @@
 
 pub mod csv;
 mod error;
+mod loading;
 mod opening;
 mod options;
 mod replay;
@@ -24,9 +31,10 @@ use detail_block::XfmTree;
 use in_memory::{Hierarchy, InMemoryTree};
 use meta_node::{Dependencies, MetaNodeTree};
 use mt_partition::MtTree;
-use vertex_tree::{CollapseLog, Mesh, NullSink, Prefetch, TreeError, VertexTree};
+use vertex_tree::{CollapseLog, Mesh, NullSink, TreeError, VertexTree};
 
 pub use self::error::{CompareError, WrongCut};
+pub use self::loading::Loading;
 use self::opening::Opening;
 pub use self::options::{Options, Pace, Paging};
 use self::replay::Replay;
@@ -64,8 +72,8 @@ pub struct Run {
     pub backend: &'static str,
     /// How the nodes that must change were found.
     pub strategy: Strategy,
-    /// What fetched pages ahead.
-    pub prefetch: Prefetch,
+    /// How pages were loaded.
+    pub prefetch: Loading,
     /// Declared speed.
     pub speed: Speed,
     /// The frames.
@@ -268,9 +276,10 @@ impl Subject {
         })
     }
 
-    /// Replays `frames` of a path with every strategy and every way to prefetch of the options. `progress` counts frames.
+    /// Replays `frames` of a path with every strategy and every way to load of the options. `progress` counts frames.
     ///
     /// # Errors
+    /// [`CompareError::NotPrinted`] before anything is done,
     /// [`CompareError::View`], [`CompareError::Store`], [`CompareError::Tree`], and [`CompareError::Wrong`] or [`CompareError::Differs`] where the
     /// options ask for a check.
     pub fn replay(
@@ -280,6 +289,10 @@ impl Subject {
         options: &Options,
         progress: Progress,
     ) -> Result<Vec<Run>, CompareError> {
+        let backend = self.backend();
+        if let Some(&prefetch) = options.prefetch.iter().find(|prefetch| !prefetch.is_for(backend)) {
+            return Err(CompareError::NotPrinted { scene: self.name.clone(), prefetch, backend });
+        }
         let mut check = self.check.take();
         if check.is_none() && options.check {
             check = Some(self.new_check()?);
@@ -289,8 +302,7 @@ impl Subject {
         let views: Vec<View> =
             frames.clone().map(|frame| options.view(path, frame)).collect::<Result<_, _>>()?;
         // Without pages there is nothing to fetch.
-        let prefetch =
-            if self.backend() == Backend::InMemory { &[Prefetch::None][..] } else { &options.prefetch };
+        let prefetch = if backend == Backend::InMemory { &[Loading::None][..] } else { &options.prefetch };
         let replays = options.strategies.iter().map(|&s| 1 + usize::from(is_checked(s))).sum::<usize>();
         let total = (prefetch.len() * replays * views.len()) as u64;
         let mut done = 0;

@@ -5,7 +5,8 @@
 //! the course of this is tested at once, so a frame ends with the cut that its views ask for, or with the changes
 //! that the backend refused counted as misses.
 //!
-//! Everything here runs on the caller's thread. A backend may have threads of its own; no call waits for them.
+//! Everything here runs on the caller's thread. A backend may have threads of its own; no call waits for them, unless the
+//! backend is wrapped so that changes do ([`Settled`](crate::settled::Settled)).
 
 mod capped;
 mod carried;
@@ -105,7 +106,7 @@ impl Limit {
 /// What a frame did and cost.
 #[derive(Clone, Copy, Debug)]
 pub struct FrameReport {
-    /// The whole refinement step.
+    /// The whole refinement step, with what it waited for a real store (see [`PageStats::stalled`]).
     pub select: Duration,
     /// The part of it spent on folds, unfolds and the mesh.
     pub apply: Duration,
@@ -158,6 +159,7 @@ impl FrameReport {
                 ahead: a.pages.ahead + b.pages.ahead,
                 ahead_used: a.pages.ahead_used + b.pages.ahead_used,
                 no_room: a.pages.no_room + b.pages.no_room,
+                stalled: a.pages.stalled + b.pages.stalled,
                 resident_bytes: b.pages.resident_bytes,
             },
             ..*b

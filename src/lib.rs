@@ -94,7 +94,7 @@ pub mod report;
 pub mod scene;
 pub mod settled;
 pub mod simplify;
-#[cfg(feature = "cli")]
+#[cfg(all(feature = "in-memory", feature = "meta-node", feature = "detail-block", feature = "mt-partition"))]
 pub mod store;
 pub mod view;
 

@@ -9,9 +9,13 @@
 //! depend on its history.
 //!
 //! What the objects share is up to their backends: trees of `mt-partition` take clones of one memory budget and one reader.
+//!
+//! [`Objects`] are for one backend, as an engine is. The objects of a `.scene` file may be of several: [`StoredScene`].
 
+#[cfg(all(feature = "in-memory", feature = "meta-node", feature = "detail-block", feature = "mt-partition"))]
+mod any;
 mod scene_file;
-#[cfg(feature = "mt-partition")]
+#[cfg(all(feature = "in-memory", feature = "meta-node", feature = "detail-block", feature = "mt-partition"))]
 mod stored;
 
 use std::time::Duration;
@@ -23,8 +27,16 @@ use crate::engine::{Engine, FrameReport, Limit, Settings};
 use crate::view::{View, ViewError};
 
 pub use scene_file::{SceneFileError, read_scene};
-#[cfg(feature = "mt-partition")]
-pub use stored::{StoredScene, StoredSceneError};
+#[cfg(all(
+    feature = "in-memory",
+    feature = "meta-node",
+    feature = "detail-block",
+    feature = "mt-partition"
+))]
+pub use {
+    any::StoredObjects,
+    stored::{ObjectLine, ScenePaging, StoredObject, StoredScene, StoredSceneError},
+};
 
 /// Where an object is in the scene: scaled, then turned, then moved.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -147,6 +159,12 @@ pub struct Object<T, M> {
 }
 
 impl<T: VertexTree, M: MeshSink> Object<T, M> {
+    /// With the settings of the scene.
+    fn new(tree: T, mesh: M, placement: Placement, settings: Settings) -> Result<Self, TreeError> {
+        let settings = Settings { rho: settings.rho / placement.scale, ..settings };
+        Ok(Self { placement, engine: Engine::new(tree, mesh, settings)? })
+    }
+
     /// Where it is.
     pub fn placement(&self) -> &Placement {
         &self.placement
@@ -194,10 +212,8 @@ impl<T: VertexTree, M: MeshSink> Objects<T, M> {
         settings: Settings,
     ) -> Result<Self, ObjectsError> {
         let object = |(number, (tree, mesh, placement)): (usize, (T, M, Placement))| {
-            let settings = Settings { rho: settings.rho / placement.scale, ..settings };
-            let engine = Engine::new(tree, mesh, settings);
-            let engine = engine.map_err(|source| ObjectsError::Tree { object: number, source })?;
-            Ok(Object { placement, engine })
+            Object::new(tree, mesh, placement, settings)
+                .map_err(|source| ObjectsError::Tree { object: number, source })
         };
         let objects = parts.into_iter().enumerate().map(object).collect::<Result<_, _>>()?;
         Ok(Self { objects, views: Vec::new() })
@@ -219,23 +235,7 @@ impl<T: VertexTree, M: MeshSink> Objects<T, M> {
     /// # Errors
     /// The first of an object. The others have been moved all the same.
     pub fn advance(&mut self, views: &[View]) -> Result<FrameReport, ObjectsError> {
-        let mut all = FrameReport {
-            select: Duration::ZERO,
-            apply: Duration::ZERO,
-            tests: 0,
-            unfolds: 0,
-            folds: 0,
-            forced: 0,
-            carried: 0,
-            blocked: 0,
-            misses: 0,
-            foreseen: 0,
-            active_nodes: 0,
-            triangles: 0,
-            cut_hash: 0,
-            limit: Limit::Error,
-            pages: PageStats::default(),
-        };
+        let mut all = nothing();
         let mut failure = None;
         for (number, object) in self.objects.iter_mut().enumerate() {
             match object.advance(number, views, &mut self.views) {
@@ -259,7 +259,7 @@ impl<T: VertexTree, M: MeshSink> Objects<T, M> {
     /// # Errors
     /// The first that a backend reports.
     pub fn settle(&mut self) -> Result<(), ObjectsError> {
-        self.for_each_tree(T::settle)
+        self.for_each_tree(|tree| tree.settle().map(drop))
     }
 
     fn for_each_tree(&mut self, f: impl Fn(&mut T) -> Result<(), TreeError>) -> Result<(), ObjectsError> {
@@ -267,6 +267,27 @@ impl<T: VertexTree, M: MeshSink> Objects<T, M> {
             f(it.engine.tree_mut()).map_err(|source| ObjectsError::Tree { object, source })
         };
         self.objects.iter_mut().enumerate().try_for_each(f)
+    }
+}
+
+/// The report of no object.
+fn nothing() -> FrameReport {
+    FrameReport {
+        select: Duration::ZERO,
+        apply: Duration::ZERO,
+        tests: 0,
+        unfolds: 0,
+        folds: 0,
+        forced: 0,
+        carried: 0,
+        blocked: 0,
+        misses: 0,
+        foreseen: 0,
+        active_nodes: 0,
+        triangles: 0,
+        cut_hash: 0,
+        limit: Limit::Error,
+        pages: PageStats::default(),
     }
 }
 
@@ -296,4 +317,5 @@ fn add(all: &mut FrameReport, report: &FrameReport, number: u64) {
     all.pages.ahead += report.pages.ahead;
     all.pages.ahead_used += report.pages.ahead_used;
     all.pages.no_room += report.pages.no_room;
+    all.pages.stalled += report.pages.stalled;
 }

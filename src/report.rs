@@ -32,8 +32,8 @@ pub struct Section {
     pub name: String,
     /// What was looked at.
     pub scene: String,
-    /// Where the hierarchy was kept.
-    pub backend: Backend,
+    /// The name of the backend in which the hierarchy was kept, or a word for several.
+    pub backend: &'static str,
     /// Triangles of the input; 0 where they were not counted.
     pub triangles: u64,
     /// Size of the hierarchy's file.
@@ -53,7 +53,7 @@ pub struct Section {
 impl Section {
     /// With nothing but its runs.
     #[must_use]
-    pub fn new(scene: &str, backend: Backend, runs: Vec<Run>) -> Self {
+    pub fn new(scene: &str, backend: &'static str, runs: Vec<Run>) -> Self {
         Self {
             name: scene.to_owned(),
             scene: scene.to_owned(),
@@ -75,10 +75,10 @@ impl Section {
 
     fn title(&self, runs: &[Run]) -> String {
         let prefetch = match self.backend {
-            Backend::InMemory => String::new(),
+            backend if backend == Backend::InMemory.name() => String::new(),
             _ => format!(", prefetch {}", runs[0].prefetch.name()),
         };
-        format!("{}, {}, path {}{prefetch}", self.scene, self.backend.name(), runs[0].path)
+        format!("{}, {}, path {}{prefetch}", self.scene, self.backend, runs[0].path)
     }
 
     /// A quantity along every path, one curve a strategy, a panel a path.
@@ -240,7 +240,7 @@ impl Report {
     fn scene(&self, html: &mut String, sections: &[Section]) -> Result<(), PlotError> {
         let _ = writeln!(html, "<h2>{}</h2>", escape(&sections[0].scene));
         for section in sections {
-            let _ = writeln!(html, "<h3>{}</h3>\n<table class=\"facts\">", section.backend.name());
+            let _ = writeln!(html, "<h3>{}</h3>\n<table class=\"facts\">", section.backend);
             for (name, value) in &section.facts {
                 let _ = writeln!(html, "<tr><th>{}<td>{}", escape(name), escape(value));
             }

@@ -1,4 +1,16 @@
-//! A backend that waits for its pages: for replays whose cuts can be compared in every frame, not for viewers.
+//! A backend that waits for its pages, inside of a change: the one way in which a frame waits for a store.
+//!
+//! Backends do not wait. A change whose page is missing is refused, the frame goes on, and what is shown is coarser for
+//! a while. DeCoro & Pajarola and Holst & Schumann print the opposite: their traversals load what they come upon, and go on when
+//! it is there. An engine over a tree in here does that: `Engine::new(Settled::new(tree), mesh, settings)`, with a tree that
+//! fetches nothing ahead ([`Prefetch::None`](vertex_tree::Prefetch::None)). Every frame then has the cut that its views ask
+//! for, at whatever time that takes, and [`PageStats::stalled`] says how long it waited: by the clock of the store, so
+//! in virtual time where the store is on virtual time, and in real time, which is part of the
+//! [time of the frame](crate::engine::FrameReport::select), where reads are real. `compare --prefetch blocking` is this.
+//!
+//! Replays whose cuts are to be compared in every frame wait in the same way, whatever fetches ahead.
+
+use std::time::Duration;
 
 use vertex_tree::{Bounds, MeshSink, NodeId, NormalCone, PageStats, Step, TreeError, VertexTree};
 
@@ -10,6 +22,8 @@ pub struct Settled<T> {
     /// Nodes that were refused all the same. What has come for others while one was waited for is not told apart, so all
     /// of them can be asked again in the next frame.
     refused: Vec<NodeId>,
+    /// How long changes have waited in this frame.
+    stalled: Duration,
 }
 
 /// A change that is refused more often is left to the next frame.
@@ -19,13 +33,13 @@ impl<T: VertexTree> Settled<T> {
     /// A backend that waits.
     #[must_use]
     pub fn new(tree: T) -> Self {
-        Self { tree, waits: true, refused: Vec::new() }
+        Self { tree, waits: true, refused: Vec::new(), stalled: Duration::ZERO }
     }
 
     /// A backend that does not, and is as it would be without this: so that what replays a path need not care.
     #[must_use]
     pub fn in_real_time(tree: T) -> Self {
-        Self { tree, waits: false, refused: Vec::new() }
+        Self { waits: false, ..Self::new(tree) }
     }
 
     fn insist(
@@ -36,7 +50,7 @@ impl<T: VertexTree> Settled<T> {
         for _ in 0..PATIENCE {
             match change(&mut self.tree)? {
                 Step::NotResident if self.waits => {
-                    self.tree.settle()?;
+                    self.stalled += self.tree.settle()?;
                     self.tree.begin_frame(&mut Vec::new())?;
                 }
                 step => return Ok(step),
@@ -91,7 +105,7 @@ impl<T: VertexTree> VertexTree for Settled<T> {
     fn peek(&self, node: NodeId, children: &mut Vec<(NodeId, Bounds)>) -> bool {
         self.tree.peek(node, children)
     }
-    fn pass(&mut self, time: std::time::Duration) -> Result<(), TreeError> {
+    fn pass(&mut self, time: Duration) -> Result<(), TreeError> {
         self.tree.pass(time)
     }
     fn children(&self, node: NodeId) -> impl Iterator<Item = NodeId> {
@@ -122,13 +136,14 @@ impl<T: VertexTree> VertexTree for Settled<T> {
     fn give_up(&mut self, node: NodeId) {
         self.tree.give_up(node);
     }
-    fn settle(&mut self) -> Result<(), TreeError> {
+    fn settle(&mut self) -> Result<Duration, TreeError> {
         self.tree.settle()
     }
     fn assert_well_formed(&self) {
         self.tree.assert_well_formed();
     }
     fn end_frame(&mut self) -> Result<PageStats, TreeError> {
-        self.tree.end_frame()
+        let stalled = std::mem::take(&mut self.stalled);
+        self.tree.end_frame().map(|pages| PageStats { stalled: pages.stalled + stalled, ..pages })
     }
 }

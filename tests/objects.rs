@@ -12,9 +12,7 @@ use common::{Random, bumpy_grid, data, random_step, random_view};
 use foldfront::criterion::Criterion;
 use foldfront::engine::Settings;
 use foldfront::in_memory::{Hierarchy, InMemoryTree};
-use foldfront::objects::{
-    Objects, Placement, PlacementError, SceneFileError, StoredScene, StoredSceneError, read_scene,
-};
+use foldfront::objects::{Objects, Placement, PlacementError, SceneFileError, read_scene};
 use foldfront::oracle::Oracle;
 use foldfront::refine::Strategy;
 use foldfront::vertex_tree::NullSink;
@@ -209,62 +207,4 @@ fn every_strategy_shows_the_same() {
             assert_eq!(oracle.compare(object.engine()), None, "frame {frame}");
         }
     }
-}
-
-/// A scene file of a hundred objects of two files is replayed with every strategy and too little memory for all: the cuts
-/// are the same in every frame, and those of brute force in the last.
-#[test]
-fn a_scene_file_is_replayed() {
-    let mut random = Random(7);
-    let folder = tempfile::tempdir().unwrap();
-    let mut text = String::from("# a hundred objects\n");
-    for (name, side) in [("small.mt", 12), ("large.mt", 20)] {
-        let log = data::log(bumpy_grid(side, &mut random));
-        let options = BuildOptions { patch: 4.0, ..BuildOptions::default() };
-        mt_partition::write(&folder.path().join(name), &log, &options).unwrap();
-    }
-    for i in 0..100 {
-        let rows = rows(&random_placement(&mut random, 15.0)).map(|x| x.to_string());
-        text += &format!("{} {}\n", ["small.mt", "large.mt"][i % 2], rows.join(" "));
-    }
-    let file = folder.path().join("hundred.scene");
-    std::fs::write(&file, text).unwrap();
-    let scene = StoredScene::open(&file).unwrap();
-    assert_eq!((scene.files().len(), scene.objects().len()), (2, 100));
-    let mut view = random_view(&mut random).with_k(60.0).unwrap();
-    let views: Vec<View> = (0..40)
-        .map(|_| {
-            random_step(&mut view, &mut random);
-            view.with_eye(4.0 * view.eye()).unwrap()
-        })
-        .collect();
-    let memory = Memory::new(scene.least_memory().max(60_000));
-    let replay = |strategy| {
-        let settings = Settings { strategy, rho: 0.05, ..Settings::default() };
-        let paging = mt_partition::Settings { memory: memory.clone(), ..Default::default() };
-        scene.replay(&views, settings, &paging, None).unwrap()
-    };
-    let runs = [Strategy::TopDown, Strategy::Front, Strategy::Event].map(replay);
-    assert_eq!(memory.used(), 0, "all is given back");
-    let mut changes = 0;
-    for frame in 0..views.len() {
-        let frames = runs.each_ref().map(|run| run[frame]);
-        assert!(frames.iter().all(|report| report.misses == 0), "frame {frame}");
-        assert!(frames.iter().all(|report| report.cut_hash == frames[0].cut_hash), "frame {frame}");
-        assert!(frames.iter().all(|report| report.pages.resident_bytes <= memory.limit()), "frame {frame}");
-        changes += frames[0].unfolds + frames[0].folds;
-    }
-    assert!(changes > 500, "{changes}");
-    let last = *views.last().unwrap();
-    let active: u64 = scene
-        .objects()
-        .iter()
-        .map(|(file, placement)| {
-            let mut cut = GraphCut::new(&scene.files()[*file]);
-            cut.find(Criterion::ScreenError, &own_views(placement, &[last])).1
-        })
-        .sum();
-    assert_eq!(runs[0].last().unwrap().active_nodes, active);
-    std::fs::write(&file, "absent.mt 1 0 0 0 0 1 0 0 0 0 1 0").unwrap();
-    assert!(matches!(StoredScene::open(&file), Err(StoredSceneError::Io { .. })));
 }

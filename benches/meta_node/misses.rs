@@ -55,7 +55,8 @@ pub fn table(words: &[String]) {
         let views = views(&walk, pixels);
         let ways = Prefetch::ALL.map(|prefetch| (InUse::Yields, prefetch));
         for (parts, latency) in [(4, Some(5)), (4, Some(50)), (4, None), (16, Some(5))] {
-            let stays = Some((InUse::Stays, Prefetch::Paper)).filter(|_| latency == Some(5));
+            let stays = [InUse::Stays, InUse::Printed].map(|in_use| (in_use, Prefetch::Paper));
+            let stays = stays.into_iter().filter(|_| latency == Some(5));
             for (in_use, prefetch) in ways.into_iter().chain(stays) {
                 let io = latency.map_or(Io::Thread, |latency| {
                     Io::Simulated(Simulated::with_latency(Duration::from_millis(latency)))

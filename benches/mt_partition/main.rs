@@ -1,7 +1,7 @@
 //! The experiments of Holst & Schumann (2007) on the backend `mt-partition`, and what its coarse nodes cost and gain.
 //!
-//! `cargo bench --bench mt_partition [-- WORD...]`; words select among `reduction`, `figures`, `selection`, and models by
-//! name. Models are the armadillo (99,976 triangles, by others) and the dragon, where the folder `shared/data` lies beside
+//! `cargo bench --bench mt_partition [-- WORD...]`; words select among `reduction`, `figures`, `within`, `selection` and `scene`,
+//! and models by name. Models are the armadillo (99,976 triangles, by others) and the dragon, where the folder `shared/data` lies beside
 //! the repository. Pictures go to `target/tmp/mt-partition`.
 //!
 //! * `reduction`: triangles stored, arcs, bytes, growth of bounds, by patch size; and triangles displayed at one pixel
@@ -11,12 +11,14 @@
 //! * `within`: what files are like that are written with less memory than the graph takes.
 //! * `selection`: what finding the changes takes, by displayed triangle, everything in memory and paging, against the in-memory
 //!   tree and meta-nodes.
+//! * `scene`: partitions of 20 to 100 nodes over a scene of a hundred objects; see `scene.rs`. Its models are its own.
 //!
 //! Frames are settled: each waits for its pages, and its cut is compared between modes; another cut fails the benchmark.
 
 #![expect(clippy::disallowed_methods, reason = "shapes to measure with")]
 
 mod figures;
+mod scene;
 mod selection;
 mod within;
 
@@ -35,17 +37,22 @@ use glam::DVec3;
 use in_memory::{Hierarchy, InMemoryTree};
 use mt_partition::{BuildOptions, CacheMode, MtFile, MtTree, WriteReport};
 
+const EXPERIMENTS: [&str; 5] = ["reduction", "figures", "within", "selection", "scene"];
+
 fn main() {
     let words: Vec<String> = std::env::args().skip(1).filter(|a| !a.starts_with("--")).collect();
-    let experiments = ["reduction", "figures", "within", "selection"];
     let models = ["armadillo_100k", "dragon", "happy"];
     let is_chosen = |name: &&&str, among: &[&str]| {
         let is_named = |name: &str| words.iter().any(|word| name.contains(word.as_str()));
         !among.iter().any(|name| is_named(name)) || is_named(name)
     };
+    // It has models of its own.
+    if is_chosen(&&"scene", &EXPERIMENTS) && !words.iter().any(|word| models.contains(&word.as_str())) {
+        scene::scenes(&folder());
+    }
     for model in models.iter().filter(|name| is_chosen(name, &models)) {
         let Some(log) = model_log(model) else { continue };
-        for &experiment in experiments.iter().filter(|name| is_chosen(name, &experiments)) {
+        for &experiment in EXPERIMENTS[..4].iter().filter(|name| is_chosen(name, &EXPERIMENTS)) {
             println!("{model}: {experiment}");
             match experiment {
                 "reduction" => reduction(&log),

@@ -1,5 +1,5 @@
 //! What fetching ahead is worth: misses, bytes, precision and recall of each paper's own scheme and of the engine's
-//! foresight, along real trajectories over real meshes, on virtual time; then what a slow store does to the time of
+//! foresight, and the time that frames wait where they load as DeCoro & Pajarola and Holst & Schumann print it, along real trajectories over real meshes, on virtual time; then what a slow store does to the time of
 //! selection.
 //!
 //! `cargo bench --bench prefetch [-- PART... MESH...]` prints tables. The parts are `--misses`, `--slow` and `--wall-clock`
@@ -12,15 +12,15 @@ use std::path::{Path as FilePath, PathBuf};
 use std::time::Duration;
 
 use foldfront::compare::csv::Summary;
-use foldfront::compare::{Options, Pace, Paging, Run, Subject};
+use foldfront::compare::{Loading, Options, Pace, Paging, Run, Subject};
 use foldfront::mesh_io;
 use foldfront::path::import::{self, Mode};
 use foldfront::path::{Path, Pose};
 use foldfront::refine::Strategy;
 use foldfront::simplify;
 use foldfront::store::{self, Backend, BuildOptions, Store};
+use foldfront::vertex_tree::read_log;
 use foldfront::vertex_tree::simulated::Simulated;
-use foldfront::vertex_tree::{Prefetch, read_log};
 
 const DATA: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/../shared/data");
 
@@ -127,7 +127,7 @@ fn compare(mesh: &str, log: &foldfront::CollapseLog, parts: Parts) {
     }
 }
 
-fn options(pace: Pace, page_memory: u64, prefetch: Vec<Prefetch>) -> Options {
+fn options(pace: Pace, page_memory: u64, prefetch: Vec<Loading>) -> Options {
     Options {
         strategies: vec![Strategy::Event],
         paging: Paging { page_memory, ..Paging::default() },
@@ -141,7 +141,7 @@ fn options(pace: Pace, page_memory: u64, prefetch: Vec<Prefetch>) -> Options {
 fn memory(subject: &Subject, walk: &Path) -> u64 {
     let frames: Vec<usize> = (0..walk.frames.len()).step_by(walk.frames.len() / 24).collect();
     2 * subject
-        .needs(walk, &frames, &options(Pace::Settled, u64::MAX, vec![Prefetch::None]))
+        .needs(walk, &frames, &options(Pace::Settled, u64::MAX, vec![Loading::None]))
         .expect("a valid file")
 }
 
@@ -161,7 +161,7 @@ fn open(file: &FilePath) -> Store {
 
 fn heading() {
     println!(
-        "{:8} {:9} {:>7} {:>7} {:>8} {:>8} {:>7} {:>8} {:>6} {:>6} {:>6} {:>5}",
+        "{:8} {:9} {:>7} {:>7} {:>8} {:>8} {:>7} {:>8} {:>6} {:>6} {:>6} {:>5} {:>9}",
         "path",
         "prefetch",
         "MiB",
@@ -173,7 +173,8 @@ fn heading() {
         "prec",
         "rec",
         "memory",
-        "stop"
+        "stop",
+        "stall ms"
     );
 }
 
@@ -181,7 +182,9 @@ fn virtual_time(file: &FilePath, mesh: &str, walk: &Path, page_memory: u64) {
     let mut subject = Subject::of_store(mesh, open(file));
     let walk = with_rest(walk);
     let pace = Pace::Simulated(FRAME, Simulated::with_latency(LATENCY));
-    let options = options(pace, page_memory, Prefetch::ALL.to_vec());
+    let backend = subject.backend();
+    let loading = Loading::ALL.into_iter().filter(|loading| loading.is_for(backend)).collect();
+    let options = options(pace, page_memory, loading);
     let runs = subject.replay(&walk, 0..walk.frames.len(), &options, &mut |_, _| ()).expect("a valid file");
     for run in &runs {
         row(run, page_memory);
@@ -200,8 +203,9 @@ fn row(run: &Run, page_memory: u64) {
         .iter()
         .rposition(|row| row.report.misses + row.report.unfolds + row.report.folds > 0)
         .map_or(0, |at| at + 1);
+    let stalled = 1e3 * later().map(|r| r.pages.stalled).sum::<Duration>().as_secs_f64();
     println!(
-        "{:8} {:9} {:7.2} {misses:7} {changes:8} {:8.3} {:7} {:8} {:>6} {:>6} {:6.1} {settles:5}",
+        "{:8} {:9} {:7.2} {misses:7} {changes:8} {:8.3} {:7} {:8} {:>6} {:>6} {:6.1} {settles:5} {stalled:9.1}",
         run.path,
         run.prefetch.name(),
         page_memory as f64 / f64::from(1 << 20),

@@ -9,10 +9,9 @@ use std::sync::Arc;
 use std::sync::atomic::{AtomicU64, Ordering};
 use std::time::Duration;
 
-use foldfront::compare::{Pace, Row, Subject};
+use foldfront::compare::{Loading, Pace, Row, Subject};
 use foldfront::path::Path;
 use foldfront::store::Store;
-use foldfront::vertex_tree::Prefetch;
 use foldfront::vertex_tree::simulated::Simulated;
 use foldfront::vertex_tree::source::{FileSource, PageSource};
 
@@ -24,7 +23,7 @@ const FRAMES: usize = 600;
 /// Replays on virtual time of which the fastest counts.
 const TIMES: usize = 5;
 
-const SCHEMES: [Prefetch; 2] = [Prefetch::Paper, Prefetch::Schedule];
+const SCHEMES: [Loading; 2] = [Loading::Paper, Loading::Schedule];
 
 const LATENCIES: [Duration; 2] = [Duration::ZERO, Duration::from_millis(50)];
 
@@ -122,7 +121,7 @@ impl Times {
     }
 }
 
-fn print(walk: &Path, prefetch: Prefetch, instant: &Times, slow: &Times) {
+fn print(walk: &Path, prefetch: Loading, instant: &Times, slow: &Times) {
     for (times, latency) in [instant, slow].into_iter().zip(LATENCIES) {
         let [median, most, all] = times.percentiles;
         print!(

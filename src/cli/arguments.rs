@@ -8,13 +8,12 @@ use clap::{Args, Parser, Subcommand, ValueEnum};
 use glam::{DQuat, DVec3};
 use meta_node::Dependencies;
 use mt_partition::CacheMode;
-use vertex_tree::Prefetch;
 use vertex_tree::simulated::Simulated;
 
 use super::Misunderstood;
 use super::values::{backend, cache, duration, frames, positive, prefetch, size, strategy, work_cap};
 use crate::budget::WorkCap;
-use crate::compare::Pace;
+use crate::compare::{Loading, Pace};
 use crate::criterion::Criterion;
 use crate::path::import;
 use crate::refine::Strategy;
@@ -200,10 +199,10 @@ pub(super) struct Compare {
     /// What meta-nodes make of neighbours that are too coarse or too fine for a change.
     #[arg(long, value_enum, default_value = "off")]
     pub dependencies: DependencyRule,
-    /// paper, schedule, none: what fetches pages before they are needed. Each paper's own scheme, the engine's foresight,
-    /// or nothing.
+    /// paper, printed, blocking, schedule, none: how pages are loaded. Each paper's own scheme, made asynchronous; El-Sana &
+    /// Chiang's rules to the letter (meta-node only); on demand, and the frame waits; the engine's foresight; or on demand.
     #[arg(long, value_delimiter = ',', value_name = "LIST", default_value = "paper", value_parser = prefetch)]
-    pub prefetch: Vec<Prefetch>,
+    pub prefetch: Vec<Loading>,
     /// Replay in real time at N frames a second, so that pages can be late: on virtual time, with a simulated store. By
     /// default each frame waits for its pages.
     #[arg(long, value_name = "N", value_parser = positive)]

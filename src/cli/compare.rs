@@ -9,8 +9,8 @@ use vertex_tree::Mesh;
 use super::arguments::Compare;
 use super::destination::check_folder;
 use super::input::{Input, Replayable};
-use super::print;
 use super::progress::stage;
+use super::{Misunderstood, print};
 use crate::budget::Budget;
 use crate::compare::{Options, Paging, Run, Subject, csv, replay_scene};
 use crate::objects::StoredScene;
@@ -28,6 +28,7 @@ pub(super) fn compare(command: &Compare) -> Result<()> {
     } else {
         Input::all(&command.input)?
     };
+    check_printed(command, &inputs)?;
     let paths: Vec<Path> = command.path.iter().map(|file| Path::read(file)).collect::<Result<_, _>>()?;
     // What is recorded for a scene has the lens of a flight around.
     let lenses: Vec<f64> = paths.iter().map(|path| path.fov_y).collect();
@@ -83,6 +84,25 @@ pub(super) fn compare(command: &Compare) -> Result<()> {
     print(&format!("{}\nThe report is in {}\n", report.to_text(), file.display()))
 }
 
+/// Before any work: whether all backends have the ways to load that are asked for.
+fn check_printed(command: &Compare, inputs: &[Input]) -> Result<()> {
+    let Some(prefetch) = command.prefetch.iter().find(|p| Backend::ALL.iter().any(|&b| !p.is_for(b))) else {
+        return Ok(());
+    };
+    for input in inputs {
+        let backends = if command.backend.is_empty() { input.backends()? } else { command.backend.clone() };
+        if let Some(backend) = backends.into_iter().find(|&backend| !prefetch.is_for(backend)) {
+            let (name, how) = (input.name(), prefetch.name());
+            let (its, backend) = (Backend::MetaNode.name(), backend.name());
+            let wrong = format!(
+                "--prefetch {how} is for {its}, not for {backend}, which {name} is to be replayed in"
+            );
+            return Err(Misunderstood(wrong).into());
+        }
+    }
+    Ok(())
+}
+
 /// The walkthroughs to replay: those that were asked for, those that were recorded for a scene, or one around the mesh.
 fn walks(input: &Input, subjects: &[Replayable], paths: &[Path]) -> Result<Vec<Path>> {
     Ok(match (paths, input, subjects) {
@@ -122,7 +142,7 @@ fn section(
     Ok(Section {
         name,
         scene: subject.name().to_owned(),
-        backend: subject.backend(),
+        backend: subject.backend().name(),
         triangles: subject.triangles(),
         file_bytes,
         simplification: built.map(|b| b.preparation + b.simplification + b.conclusion),
@@ -141,23 +161,27 @@ fn objects(
     walks: &[Path],
     options: &Options,
 ) -> Result<Section> {
-    let backend = Backend::MtPartition;
-    if let Some(other) = command.backend.iter().find(|&&other| other != backend) {
-        bail!(
-            "{}: scenes of several objects are for {}, not for {}",
-            file.display(),
-            backend.name(),
-            other.name()
-        );
-    }
     if command.wall_clock {
         bail!("{}: scenes of several objects are not replayed by the wall clock", file.display());
     }
     if walks.is_empty() {
         bail!("{}: a scene of several objects needs a --path", file.display());
     }
-    let scene = StoredScene::open(file)?;
-    let mut section = Section::new(name, backend, Vec::new());
+    let options_of_meshes = simplify::Options { merge_components: command.merge_components };
+    let scene = stage(&format!("{name}: opening"), |_| StoredScene::open_with(file, &options_of_meshes))?;
+    for object in scene.objects() {
+        let own = scene.files()[object.file].backend();
+        if let Some(other) = command.backend.iter().find(|&&backend| backend != own) {
+            bail!(
+                "{}: {}: is for {}, not for {}",
+                object.at,
+                object.at.file.display(),
+                own.name(),
+                other.name()
+            );
+        }
+    }
+    let mut section = Section::new(name, scene.backend(), Vec::new());
     for walk in walks {
         let frames = frames_of(command, walk)?;
         let label = format!("{name}: {}, {} frames", walk.name, frames.len());

@@ -90,6 +90,23 @@ impl Input {
         }
     }
 
+    /// The backends that it is replayed in where none is asked for.
+    pub fn backends(&self) -> Result<Vec<Backend>> {
+        match self {
+            Self::Stored(path) => Ok(backend_of(path)?.into_iter().collect()),
+            // A scene file that can not be read is complained about when it is opened, and so is what it names.
+            Self::Objects(path) => {
+                let objects = crate::objects::read_scene(path).unwrap_or_default();
+                let backends = objects.iter().map(|(file, _)| match backend_of(file) {
+                    Ok(backend) => backend.or(Some(Backend::InMemory)),
+                    Err(_) => None,
+                });
+                Ok(backends.flatten().collect())
+            }
+            Self::Scene(_) | Self::Log(_) | Self::Meshes(_) => Ok(vec![Backend::InMemory]),
+        }
+    }
+
     /// A short name for tables and file names.
     pub fn name(&self) -> String {
         let stem =

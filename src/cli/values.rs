@@ -4,9 +4,9 @@ use std::ops::Range;
 use std::time::Duration;
 
 use mt_partition::CacheMode;
-use vertex_tree::Prefetch;
 
 use crate::budget::WorkCap;
+use crate::compare::Loading;
 use crate::refine::Strategy;
 use crate::store::Backend;
 
@@ -68,9 +68,9 @@ pub(super) fn backend(text: &str) -> Result<Backend, String> {
     Backend::ALL.into_iter().find(|b| b.name() == text).ok_or_else(names)
 }
 
-pub(super) fn prefetch(text: &str) -> Result<Prefetch, String> {
-    let names = || format!("one of {} is expected", Prefetch::ALL.map(Prefetch::name).join(", "));
-    Prefetch::ALL.into_iter().find(|prefetch| prefetch.name() == text).ok_or_else(names)
+pub(super) fn prefetch(text: &str) -> Result<Loading, String> {
+    let names = || format!("one of {} is expected", Loading::ALL.map(Loading::name).join(", "));
+    Loading::ALL.into_iter().find(|prefetch| prefetch.name() == text).ok_or_else(names)
 }
 
 pub(super) fn cache(text: &str) -> Result<CacheMode, String> {

@@ -8,8 +8,8 @@ use vertex_tree::PageStats;
 use super::Run;
 use crate::engine::Limit;
 
-/// Columns of `frames.csv`: one row per scene, path, backend, strategy and frame.
-const FRAMES: [&str; 23] = [
+/// Columns of `frames.csv`: one row per scene, path, backend, strategy and frame. What is added comes last.
+const FRAMES: [&str; 25] = [
     "scene",
     "path",
     "backend",
@@ -33,10 +33,12 @@ const FRAMES: [&str; 23] = [
     "read_bytes",
     "resident_bytes",
     "cut_hash",
+    "stall_ns",
+    "faults",
 ];
 
-/// Columns of `summary.csv`: one row per scene, path, backend and strategy.
-const SUMMARY: [&str; 18] = [
+/// Columns of `summary.csv`: one row per scene, path, backend, strategy and way to load. What is added comes last.
+const SUMMARY: [&str; 22] = [
     "scene",
     "path",
     "backend",
@@ -55,6 +57,10 @@ const SUMMARY: [&str; 18] = [
     "reads",
     "read_bytes",
     "peak_resident_bytes",
+    "stall_ns",
+    "faults",
+    "wrong_mean",
+    "wrong_max",
 ];
 
 /// A file could not be written.
@@ -106,6 +112,10 @@ pub struct Summary {
     pub memory_limited: f64,
     /// Most bytes of the hierarchy in memory at once.
     pub peak_resident_bytes: u64,
+    /// How long changes have waited for the store, see [`PageStats::stalled`].
+    pub stalled: Duration,
+    /// Reads that failed or brought a damaged page.
+    pub faults: u64,
     /// Where it was looked at: the largest and the mean number of nodes that differ from the oracle, and the share of
     /// frames in which any does.
     pub wrong: Option<Wrong>,
@@ -174,6 +184,8 @@ impl Summary {
             io_limited: limited(Limit::Io),
             memory_limited: limited(Limit::Memory),
             peak_resident_bytes: run.rows.iter().map(|r| r.report.pages.resident_bytes).max().unwrap_or(0),
+            stalled: run.rows.iter().map(|r| r.report.pages.stalled).sum(),
+            faults: run.rows.iter().map(|r| r.report.pages.faults).sum(),
             wrong: (!wrong.is_empty()).then(|| Wrong {
                 largest: wrong.iter().copied().max().unwrap_or(0),
                 mean: wrong.iter().sum::<u64>() as f64 / wrong.len() as f64,
@@ -216,6 +228,8 @@ pub fn write_frames(file: &Path, runs: &[&Run]) -> Result<(), WriteError> {
                     r.pages.read_bytes.to_string(),
                     r.pages.resident_bytes.to_string(),
                     format!("{:016x}", r.cut_hash),
+                    r.pages.stalled.as_nanos().to_string(),
+                    r.pages.faults.to_string(),
                 ])?;
             }
         }
@@ -250,6 +264,10 @@ pub fn write_summary(file: &Path, runs: &[&Run]) -> Result<(), WriteError> {
                 s.reads.to_string(),
                 s.read_bytes.to_string(),
                 s.peak_resident_bytes.to_string(),
+                s.stalled.as_nanos().to_string(),
+                s.faults.to_string(),
+                s.wrong.map_or_else(String::new, |w| format!("{:.3}", w.mean)),
+                s.wrong.map_or_else(String::new, |w| w.largest.to_string()),
             ])?;
         }
         Ok(())

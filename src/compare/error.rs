@@ -2,11 +2,12 @@
 
 use vertex_tree::{LogError, TreeError};
 
+use super::Loading;
 use crate::criterion::Criterion;
 use crate::objects::StoredSceneError;
 use crate::oracle::Difference;
 use crate::refine::Strategy;
-use crate::store::StoreError;
+use crate::store::{Backend, StoreError};
 use crate::view::{View, ViewError};
 
 /// A comparison stopped.
@@ -47,6 +48,16 @@ pub enum CompareError {
         /// How many nodes.
         wrong: u64,
     },
+    /// The rules of a paper that is not the backend's are asked for.
+    #[error("{scene}: prefetch {} is for {}, not for {}", prefetch.name(), Backend::MetaNode.name(), backend.name())]
+    NotPrinted {
+        /// What was to be looked at.
+        scene: String,
+        /// What was asked for.
+        prefetch: Loading,
+        /// The backend.
+        backend: Backend,
+    },
     /// A frame of a path has no view at the tolerance.
     #[error("path {path}, frame {frame}: {source}")]
     View {
@@ -71,19 +82,7 @@ pub enum CompareError {
         /// The scene.
         scene: String,
         /// Why.
-        source: StoredSceneError,
-    },
-    /// Two strategies have different cuts of a scene of several objects.
-    #[error("{scene}, path {path}, frame {frame}: {} and {} have different cuts", strategies[0], strategies[1])]
-    Disagree {
-        /// The scene.
-        scene: String,
-        /// The path.
-        path: String,
-        /// Number of the frame in the path.
-        frame: usize,
-        /// The strategies.
-        strategies: [&'static str; 2],
+        source: Box<StoredSceneError>,
     },
     /// A strategy's cut is not the oracle's.
     #[error("{0}")]

@@ -4,10 +4,9 @@ use std::time::Duration;
 
 use meta_node::Dependencies;
 use mt_partition::CacheMode;
-use vertex_tree::Prefetch;
 use vertex_tree::simulated::Simulated;
 
-use super::CompareError;
+use super::{CompareError, Loading};
 use crate::budget::{Budget, WorkCap};
 use crate::criterion::Criterion;
 use crate::engine::Settings;
@@ -39,8 +38,8 @@ pub struct Options {
     pub check: bool,
     /// What backends may use.
     pub paging: Paging,
-    /// What fetches pages ahead, each in a replay of its own.
-    pub prefetch: Vec<Prefetch>,
+    /// How pages are loaded, each in a replay of its own.
+    pub prefetch: Vec<Loading>,
     /// How time passes.
     pub pace: Pace,
 }
@@ -101,7 +100,7 @@ impl Default for Options {
             omega: None,
             check: false,
             paging: Paging::default(),
-            prefetch: vec![Prefetch::Paper],
+            prefetch: vec![Loading::Paper],
             pace: Pace::Settled,
         }
     }

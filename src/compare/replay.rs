@@ -1,7 +1,7 @@
 //! One strategy along one path.
 
 use std::ops::Range;
-use std::time::Instant;
+use std::time::{Duration, Instant};
 
 use rustc_hash::FxHashSet;
 use vertex_tree::{MeshSink, NodeId, NullSink, VertexTree};
@@ -37,6 +37,8 @@ impl Replay<'_> {
         let wrap = |e| self.subject.tree_error(e);
         let mut engine = Engine::new(tree, mesh, self.settings).map_err(wrap)?;
         let mut start = Instant::now();
+        // While a frame waits for the store the path does not go on.
+        let mut stalled = Duration::ZERO;
         for (at, (frame, view)) in self.frames.clone().zip(self.views).enumerate() {
             let views = std::slice::from_ref(view);
             match self.opening.pace {
@@ -49,11 +51,12 @@ impl Replay<'_> {
                 }
                 Pace::Simulated(time, _) => engine.tree_mut().pass(time).map_err(wrap)?,
                 Pace::WallClock(time) => {
-                    let due = start + time.mul_f64(at as f64);
+                    let due = start + time.mul_f64(at as f64) + stalled;
                     std::thread::sleep(due.saturating_duration_since(Instant::now()));
                 }
             }
             let report = engine.advance(views).map_err(wrap)?;
+            stalled += report.pages.stalled;
             after(frame, &mut engine, report)?;
         }
         Ok(())

@@ -1,7 +1,7 @@
-//! Strategies along a path through a scene of several objects.
+//! Strategies along a path through a scene of several objects, of whatever backends.
 //!
-//! All objects share one memory and one reader. There is no brute force over a whole scene: a check compares the exact
-//! strategies with each other.
+//! All objects share one memory; see [`objects`](crate::objects::StoredScene) for what else. A check compares every object in every
+//! frame with the brute-force cut of its own nodes, in a replay of its own.
 
 use std::ops::Range;
 
@@ -9,15 +9,16 @@ use super::{CompareError, Opening, Options, Pace, Row, Run};
 use crate::objects::StoredScene;
 use crate::path::Path;
 use crate::progress::Progress;
-use crate::store::Backend;
+use crate::store::Store;
 use crate::view::View;
 
-/// Replays `frames` of a path through a scene with every strategy and every way to prefetch of the options. Budgets are
+/// Replays `frames` of a path through a scene with every strategy and every way to load of the options. Budgets are
 /// those of each object. By the wall clock a scene can not be replayed; it is then on a settled replay. `progress` counts
 /// replays.
 ///
 /// # Errors
-/// [`CompareError::View`], [`CompareError::Objects`], and [`CompareError::Disagree`] where the options ask for a check.
+/// [`CompareError::NotPrinted`] before anything is done, [`CompareError::View`], [`CompareError::Objects`], and
+/// [`CompareError::Differs`] where the options ask for a check.
 pub fn replay_scene(
     name: &str,
     scene: &StoredScene,
@@ -26,10 +27,22 @@ pub fn replay_scene(
     options: &Options,
     progress: Progress,
 ) -> Result<Vec<Run>, CompareError> {
-    let wrap = |source| CompareError::Objects { scene: name.to_owned(), source };
+    let wrap = |source| CompareError::Objects { scene: name.to_owned(), source: Box::new(source) };
+    for &prefetch in &options.prefetch {
+        let mut backends = scene.files().iter().map(Store::backend);
+        if let Some(backend) = backends.find(|&backend| !prefetch.is_for(backend)) {
+            return Err(CompareError::NotPrinted { scene: name.to_owned(), prefetch, backend });
+        }
+    }
+    let mut brute_force = options.check.then(|| scene.brute_force()).transpose().map_err(wrap)?;
     let speed = options.declared_speed(path);
     let views: Vec<View> = frames.clone().map(|frame| options.view(path, frame)).collect::<Result<_, _>>()?;
-    let total = (options.prefetch.len() * options.strategies.len()) as u64;
+    let replays = options.prefetch.len() * options.strategies.len() * (1 + usize::from(options.check));
+    let mut done = 0;
+    let mut count = || {
+        done += 1;
+        progress(done, replays as u64);
+    };
     let mut runs: Vec<Run> = Vec::new();
     for &prefetch in &options.prefetch {
         let opening = Opening { paging: options.paging, prefetch, pace: options.pace };
@@ -39,42 +52,34 @@ pub fn replay_scene(
         };
         for &strategy in &options.strategies {
             let settings = options.settings(strategy, &speed);
+            let (backend, scene_name, path) = (scene.backend(), name.to_owned(), path.name.clone());
+            let mut rows = Vec::with_capacity(views.len());
             // A memory and a store for each replay.
-            let reports =
-                scene.replay(&views, settings, &opening.mt_partition(), frame_time).map_err(wrap)?;
-            let rows = frames
-                .clone()
-                .zip(reports)
-                .map(|(frame, report)| Row { frame, report, wrong: None })
-                .collect();
-            let backend = Backend::MtPartition.name();
-            let (scene, path) = (name.to_owned(), path.name.clone());
-            runs.push(Run { scene, path, backend, strategy, prefetch, speed, rows });
-            progress(runs.len() as u64, total);
+            let measured = scene.replay(&views, settings, &opening.scene(), frame_time, |at, _, report| {
+                rows.push(Row { frame: frames.start + at, report, wrong: None });
+            });
+            measured.map_err(wrap)?;
+            count();
+            if let Some(brute_force) = &mut brute_force {
+                let mut differs = None;
+                let checked =
+                    scene.replay(&views, settings, &opening.scene(), frame_time, |at, objects, report| {
+                        let [wrong, unexplained] = objects.wrong(brute_force);
+                        rows[at].wrong = Some(wrong);
+                        let is_exact = strategy.is_exact() && report.carried + report.blocked == 0;
+                        if is_exact && unexplained > 0 {
+                            differs = differs.or(Some((frames.start + at, unexplained)));
+                        }
+                    });
+                checked.map_err(wrap)?;
+                count();
+                if let Some((frame, wrong)) = differs {
+                    let (scene, strategy) = (scene_name, strategy.name());
+                    return Err(CompareError::Differs { scene, path, frame, strategy, backend, wrong });
+                }
+            }
+            runs.push(Run { scene: scene_name, path, backend, strategy, prefetch, speed, rows });
         }
-    }
-    if options.check {
-        agree(&runs)?;
     }
     Ok(runs)
-}
-
-/// Whether all exact strategies have the same cut in every frame in which none has been refused anything.
-fn agree(runs: &[Run]) -> Result<(), CompareError> {
-    let mut exact = runs.iter().filter(|run| run.strategy.is_exact());
-    let Some(first) = exact.next() else { return Ok(()) };
-    for run in exact {
-        for (a, b) in first.rows.iter().zip(&run.rows) {
-            let is_late = |row: &Row| row.report.misses + row.report.carried > 0;
-            if a.report.cut_hash != b.report.cut_hash && !is_late(a) && !is_late(b) {
-                return Err(CompareError::Disagree {
-                    scene: run.scene.clone(),
-                    path: run.path.clone(),
-                    frame: a.frame,
-                    strategies: [first.strategy.name(), run.strategy.name()],
-                });
-            }
-        }
-    }
-    Ok(())
 }

@@ -1,13 +1,14 @@
 //! `.scene` files: text, one object a line, a file name and a 3 by 4 matrix row by row.
 //!
 //! ```text
-//! # two dragons, the second twice as large, a quarter turned about y, and 3 units to the right
-//! dragon.mt  1 0 0 0  0 1 0 0   0 0 1 0
-//! dragon.mt  0 0 2 3  0 2 0 0  -2 0 0 0
+//! # a dragon, and a bunny twice as large, a quarter turned about y, and 3 units to the right
+//! dragon.mt   1 0 0 0  0 1 0 0   0 0 1 0
+//! bunny.meta  0 0 2 3  0 2 0 0  -2 0 0 0
 //! ```
 //!
 //! Lines that are empty or start with `#` count for nothing. The last twelve words of a line are the matrix; what stands
-//! before them is the name, which may have spaces in it. Names are relative to the folder of the scene file.
+//! before them is the name, which may have spaces in it. Names are relative to the folder of the scene file. A file is anything that
+//! `build` wrote, of any backend, or a mesh.
 
 use std::io;
 use std::path::{Path, PathBuf};
@@ -69,6 +70,11 @@ pub enum SceneFileError {
 /// # Errors
 /// The first line that is wrong.
 pub fn read_scene(path: &Path) -> Result<Vec<(PathBuf, Placement)>, SceneFileError> {
+    Ok(read_lines(path)?.into_iter().map(|(_, file, placement)| (file, placement)).collect())
+}
+
+/// The same with the line of each object.
+pub(super) fn read_lines(path: &Path) -> Result<Vec<(usize, PathBuf, Placement)>, SceneFileError> {
     let text = std::fs::read_to_string(path)
         .map_err(|source| SceneFileError::Io { file: path.to_owned(), source })?;
     let file = || path.to_owned();
@@ -100,7 +106,7 @@ pub fn read_scene(path: &Path) -> Result<Vec<(PathBuf, Placement)>, SceneFileErr
             line,
             source,
         })?;
-        objects.push((folder.join(name.trim_end()), placement));
+        objects.push((line, folder.join(name.trim_end()), placement));
     }
     if objects.is_empty() {
         return Err(SceneFileError::Empty { file: file() });

@@ -120,7 +120,7 @@ pub(super) fn by_strategy(run: &Run) -> (String, usize) {
 
 /// Name and colour of the curve of a way to prefetch.
 pub(super) fn by_prefetch(run: &Run) -> (String, usize) {
-    let colour = vertex_tree::Prefetch::ALL.iter().position(|&p| p == run.prefetch).unwrap_or(0);
+    let colour = crate::compare::Loading::ALL.iter().position(|&p| p == run.prefetch).unwrap_or(0);
     (format!("{}, prefetch {}", run.backend, run.prefetch.name()), colour)
 }
 
@@ -130,7 +130,7 @@ pub(super) fn scaling(sections: &[Section]) -> Result<Vec<String>, PlotError> {
     let base = |section: &Section| section.scene.split('@').next().unwrap_or_default().to_owned();
     let mut groups: Vec<(String, Vec<&Section>)> = Vec::new();
     for section in sections {
-        let name = format!("{}, {}", base(section), section.backend.name());
+        let name = format!("{}, {}", base(section), section.backend);
         match groups.iter_mut().find(|(group, _)| *group == name) {
             Some((_, members)) => members.push(section),
             None => groups.push((name, vec![section])),

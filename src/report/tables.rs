@@ -38,7 +38,11 @@ pub(super) const STRATEGIES: &[(&str, &str)] = &[
 /// Columns of the table of paging.
 pub(super) const PAGING: &[(&str, &str)] = &[
     ("backend", "where the hierarchy is kept"),
-    ("prefetch", "what fetches pages ahead: the paper's own scheme, the engine's foresight, or nothing"),
+    (
+        "prefetch",
+        "how pages are loaded: paper is the backend's published scheme made asynchronous, printed El-Sana & Chiang's to the \
+         letter, blocking lets frames wait, schedule is the engine's foresight, none is on demand",
+    ),
     ("misses", "nodes whose change was refused for want of a page, each counted once a frame"),
     ("% of flips", "misses as a share of the changes that were wanted"),
     ("reads", "read operations, those of the first frame included"),
@@ -51,6 +55,10 @@ pub(super) const PAGING: &[(&str, &str)] = &[
     ("I/O limited %", "frames whose detail was kept down by pages that had not come"),
     ("memory limited %", "frames whose detail was kept down by pages that there was no room for"),
     ("peak MiB", "most bytes of the hierarchy in memory"),
+    (
+        "stalled ms",
+        "what changes have waited for the store: virtual time with --fps, where only blocking waits",
+    ),
 ];
 
 /// Columns of the table of files and construction.
@@ -108,6 +116,7 @@ pub(super) fn paging(runs: &[&Run]) -> Table {
             format!("{:.1}", s.io_limited),
             format!("{:.1}", s.memory_limited),
             mebibytes(s.peak_resident_bytes),
+            format!("{:.1}", 1e3 * s.stalled.as_secs_f64()),
         ]
     };
     Table { columns: PAGING, rows: runs.iter().map(row).collect() }
@@ -127,7 +136,7 @@ pub(super) fn storage(sections: &[Section]) -> Table {
         let [writing, writing_each] = per(section.writing);
         vec![
             section.scene.clone(),
-            section.backend.name().to_owned(),
+            section.backend.to_owned(),
             section.triangles.to_string(),
             section.file_bytes.map_or_else(String::new, mebibytes),
             section.file_bytes.map_or_else(String::new, |bytes| {

@@ -5,10 +5,10 @@ use std::collections::HashMap;
 use crate::workplace::Workplace;
 
 const FRAMES: &str = "scene,path,backend,strategy,prefetch,frame,select_ns,apply_ns,tests,unfolds,folds,forced,blocked,\
-                      carried,misses,wrong,limit,active_nodes,triangles,reads,read_bytes,resident_bytes,cut_hash";
+                      carried,misses,wrong,limit,active_nodes,triangles,reads,read_bytes,resident_bytes,cut_hash,stall_ns,faults";
 const SUMMARY: &str = "scene,path,backend,strategy,prefetch,frames,select_ns_median,select_ns_mean,select_ns_p99,\
                        apply_ns_median,tests_mean,changes_mean,active_nodes_mean,triangles_mean,miss_percent,reads,\
-                       read_bytes,peak_resident_bytes";
+                       read_bytes,peak_resident_bytes,stall_ns,faults,wrong_mean,wrong_max";
 const STRATEGIES: [&str; 4] = ["top-down", "front", "event", "event-published"];
 
 /// The rows of a table with exactly these columns, by column.

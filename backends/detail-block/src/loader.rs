@@ -10,7 +10,7 @@
 use std::collections::VecDeque;
 use std::sync::Arc;
 use std::thread::JoinHandle;
-use std::time::Duration;
+use std::time::{Duration, Instant};
 
 use parking_lot::{Condvar, Mutex};
 use vertex_tree::simulated::{Line, Reads, Simulated};
@@ -215,13 +215,17 @@ impl Loader {
         }
     }
 
-    /// Waits until everything asked for has been read or has failed.
-    pub fn settle(&mut self) {
+    /// Waits until everything asked for has been read or has failed. Returns how long that took.
+    pub fn settle(&mut self) -> Duration {
         match self {
-            Self::Thread(thread) => thread.settle(),
+            Self::Thread(thread) => {
+                let start = Instant::now();
+                thread.settle();
+                start.elapsed()
+            }
             Self::Line(line) => {
                 let (line, reads) = &mut **line;
-                line.settle(reads);
+                line.settle(reads)
             }
         }
     }

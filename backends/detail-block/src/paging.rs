@@ -12,6 +12,12 @@
 //!   that no change has lately used make room, and if that is not enough, the block is missed. (Setting a quota below what
 //!   the front itself occupies is the exception: nothing is loaded then until the front has folded to below it.)
 //!
+//! As printed, the traversal loads the child blocks that it comes upon "and continues": the frame waits for the disk. Here a
+//! change that wants a block is refused, and the block is asked for, so that no frame waits; that is the only difference between
+//! the paper's scheme and [`Prefetch::Paper`](vertex_tree::Prefetch::Paper). Whoever wants it as printed waits for
+//! [`settle`](vertex_tree::VertexTree::settle) and asks again, as foldfront's `Settled` does (`--prefetch blocking`);
+//! [`Io::Blocking`](crate::Io::Blocking) reads within the change itself.
+//!
 //! Blocks of active nodes are never removed, so whatever is active can be asked about. A root of a block that is in play
 //! but removed leaves behind its sphere, error and parent: a [`Stub`].
 
@@ -249,11 +255,9 @@ impl Paging {
         self.error.take().map_or(Ok(()), |error| Err(tree_error(error)))
     }
 
-    /// Waits for all that is under way. It is taken at the start of the next frame.
-    pub fn settle(&mut self) {
-        if let Some(loader) = &mut self.loader {
-            loader.settle();
-        }
+    /// Waits for all that is under way. It is taken at the start of the next frame. Returns how long that took.
+    pub fn settle(&mut self) -> Duration {
+        self.loader.as_mut().map_or(Duration::ZERO, Loader::settle)
     }
 
     /// Lets time pass, if it is virtual.

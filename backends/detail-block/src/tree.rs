@@ -339,9 +339,8 @@ impl VertexTree for XfmTree {
         self.paging.give_up(node);
     }
 
-    fn settle(&mut self) -> Result<(), TreeError> {
-        self.paging.settle();
-        Ok(())
+    fn settle(&mut self) -> Result<Duration, TreeError> {
+        Ok(self.paging.settle())
     }
 
     #[track_caller]

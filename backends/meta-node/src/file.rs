@@ -174,6 +174,12 @@ impl MetaNodeFile {
         self.pages_at + 4 * (self.starts[page / STRIDE] + words)
     }
 
+    /// Bytes of page memory that a tree needs at least.
+    #[must_use]
+    pub fn least_memory(&self) -> u64 {
+        self.holder_bytes() * u64::from(crate::pager::LEAST_HOLDERS)
+    }
+
     /// Bytes of the largest place holder.
     pub(crate) fn holder_bytes(&self) -> u64 {
         4 * u64::from(self.header.largest_words).max(1)
@@ -213,10 +219,7 @@ impl MetaNodeFile {
             ("nodes a page", format!("{:.1}", mean(h.collapses.into(), h.pages))),
             ("bytes", bytes.to_string()),
             ("bytes a triangle", format!("{:.1}", mean(bytes, h.triangles))),
-            (
-                "least page memory, bytes",
-                (self.holder_bytes() * u64::from(crate::pager::LEAST_HOLDERS)).to_string(),
-            ),
+            ("least page memory, bytes", self.least_memory().to_string()),
         ];
         facts.extend(self.georeference.facts());
         facts

@@ -20,13 +20,32 @@
 //!
 //! The paper's navigation reads the nodes of the front in every frame, so that their pages must stay. Ours does not: the
 //! engine keeps sphere and error of the front itself, and a page is touched only by a change. So with
-//! [`InUse::Yields`], the default, what has been prefetched and not touched yet makes room first, then what has not been
+//! [`InUse::Yields`], the default and what `--prefetch paper` means, what has been prefetched and not touched yet makes room first, then what has not been
 //! touched for longest, whatever its counts, for switching down too; and every cut can be reached with any number of
 //! place holders from four on. With [`InUse::Stays`] free
 //! places go first, then those of pages that are only referred to, the three-free rule holds as printed, and a front that
 //! needs more pages than there are is coarser.
 //!
-//! A page that is asked for urgently is not evicted before the end of the frame at whose start it came, nor is one that
+//! # As printed
+//!
+//! [`InUse::Printed`] is the paper's section 3.3 to the letter, for comparison. Beyond what stays in use staying:
+//!
+//! * K place holders, each of the size of the largest page: memory for a quarter of the file holds fewer than a quarter of the pages.
+//! * Root pages are pages like others: they stay while they are in use or referred to.
+//! * What is prefetched are the pages above and below those in use, and nothing else. It takes the first place of the free
+//!   list. Where there is none it is given up: only another reference, or an urgent request, asks again.
+//! * An urgent request takes the first of the free list, or else the first that is only prefetched, whether
+//!   or not that has just come; pages in use never make room, for switching up neither, since one that is not in use is always left.
+//! * A switch down to a page takes that page: a node with children on other pages is unfolded only when these are there. The
+//!   request for them is urgent.
+//!
+//! What remains different, and can not be told from outside: a place holder is reserved when a page is asked for,
+//! not when I/O comes to it, so an urgent request may take back one that waits; and counts are kept for pages that are not in memory,
+//! where the paper lets them be.
+//!
+//! # Liveness
+//!
+//! But for the printed rules, a page that is asked for urgently is not evicted before the end of the frame at whose start it came, nor is one that
 //! has been touched in the frame. So each urgent read leads to a change at least, and a camera at rest gets its cut.
 //!
 //! A node can unfold before the page of its children is there, since links carry their spheres; so what is asked for is
@@ -153,11 +172,15 @@ impl Pager {
     /// Starts the I/O thread, where there is to be one.
     pub fn new(file: Arc<MetaNodeFile>, settings: &Settings) -> Result<Self, MetaNodeError> {
         let pages = file.header.pages as usize;
+        let how = match settings.in_use {
+            InUse::Printed => Prefetch::Paper,
+            InUse::Yields | InUse::Stays => settings.prefetch,
+        };
         let mut pager = Self {
             store: Store::new(&file, settings.io)?,
             in_use: settings.in_use,
-            how: settings.prefetch,
-            foresight: Foresight::new(if settings.prefetch == Prefetch::Schedule { pages } else { 0 }),
+            how,
+            foresight: Foresight::new(if how == Prefetch::Schedule { pages } else { 0 }),
             frame: 1,
             table: vec![NONE; pages],
             usage: vec![0; pages],
@@ -183,6 +206,17 @@ impl Pager {
         };
         pager.set_page_memory(settings.page_memory)?;
         Ok(pager)
+    }
+
+    /// Whether all is as in the paper.
+    #[inline(always)]
+    pub fn is_printed(&self) -> bool {
+        self.in_use == InUse::Printed
+    }
+
+    /// Words of a place holder for a page of so many.
+    fn place_words(&self, words: usize) -> u64 {
+        if self.is_printed() { self.file.header.largest_words.into() } else { words as u64 }
     }
 
     /// Where a page is, if it is in memory.
@@ -220,9 +254,9 @@ impl Pager {
     fn evict(&mut self, holder: u32) {
         self.count_around(holder, false);
         self.lists.remove(holder);
+        self.taken -= self.place_words(self.holders[holder as usize].words.len());
         let slot = &mut self.holders[holder as usize];
         self.table[slot.page as usize] = NONE;
-        self.taken -= slot.words.len() as u64;
         (slot.page, slot.words) = (NONE, Box::default());
         self.resident -= 1;
         self.empty.push(holder);
@@ -246,10 +280,10 @@ impl Pager {
         }
     }
 
-    /// Waits until everything that has been asked for is there, or has failed.
-    pub fn settle(&mut self) {
+    /// Waits until everything that has been asked for is there, or has failed. Returns how long that took.
+    pub fn settle(&mut self) -> Duration {
         self.post();
-        self.store.settle();
+        self.store.settle()
     }
 
     /// Lets time pass on a store that has its own.

@@ -14,7 +14,7 @@ pub struct Settings {
     pub dependencies: Dependencies,
     /// What happens to pages with nodes of the front where there is no other place.
     pub in_use: InUse,
-    /// What fetches pages before a change needs them.
+    /// What fetches pages before a change needs them; not asked with [`InUse::Printed`].
     pub prefetch: Prefetch,
     /// Who reads.
     pub io: Io,
@@ -41,6 +41,10 @@ pub enum InUse {
     Yields,
     /// They stay, as in the paper, but for switching up and for less memory. A cut that needs more is not reached.
     Stays,
+    /// They stay, and all else is as section 3.3 of the paper has it, to the letter: place holders of one size, no retries, a
+    /// switch down only with the page of the children there. Pages are prefetched as the paper does it, whatever
+    /// [`Settings::prefetch`] says.
+    Printed,
 }
 
 /// Who reads pages, and when.

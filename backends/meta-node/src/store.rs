@@ -1,7 +1,7 @@
 //! Who carries out commands: the I/O thread over the command board, or, on virtual time, whoever plays the clock.
 
 use std::sync::Arc;
-use std::time::Duration;
+use std::time::{Duration, Instant};
 
 use vertex_tree::simulated::{Line, Reads};
 
@@ -119,13 +119,16 @@ impl Store {
         }
     }
 
-    /// Waits until no command waits and none is being carried out; on virtual time, lets that pass.
-    pub fn settle(&mut self) {
+    /// Waits until no command waits and none is being carried out; on virtual time, lets that pass. Returns how long that
+    /// took.
+    pub fn settle(&mut self) -> Duration {
         match self {
-            Self::Thread(board) => board.settle(),
-            Self::Simulated(store) => {
-                store.line.settle(&mut store.pages);
+            Self::Thread(board) => {
+                let start = Instant::now();
+                board.settle();
+                start.elapsed()
             }
+            Self::Simulated(store) => store.line.settle(&mut store.pages),
         }
     }
 

@@ -128,13 +128,33 @@ impl MetaNodeTree {
         let found = self.pager.find(page);
         if found.is_none() {
             self.pager.urge(page, switch);
-            if self.rules.is_none() && self.pager.is_under_way(page) {
+            if self.rules.is_none() && !self.pager.is_printed() && self.pager.is_under_way(page) {
                 self.refused.insert(node);
             } else {
                 self.again.push(node);
             }
         }
         found
+    }
+
+    /// In the paper a switch down to a page takes that page. Whether those of a node's children are there; if not, they are
+    /// asked for.
+    fn has_pages_below(&mut self, node: NodeId, holder: u32) -> bool {
+        let (_, slot) = self.place(node);
+        let mut has_all = true;
+        for child in self.pager.page(holder).node(slot).children() {
+            if let Child::Link(link) = child {
+                let below = self.pager.page(holder).link(link).node.0 >> self.slot_bits;
+                if self.pager.find(below).is_none() {
+                    has_all = false;
+                    self.pager.urge(below, Switch::Down);
+                }
+            }
+        }
+        if !has_all {
+            self.again.push(node);
+        }
+        has_all
     }
 
     /// The numbers that nodes of a page have.
@@ -282,6 +302,10 @@ impl VertexTree for MetaNodeTree {
         if slot >= page.layout.nodes {
             return Err(self.damaged(own));
         }
+        if self.pager.is_printed() && !self.has_pages_below(node, holder) {
+            return Ok(Step::NotResident);
+        }
+        let page = self.pager.page(holder);
         let of = page.node(slot);
         let (children, leaves) = (of.children(), of.leaves());
         let (start, end) = page.brought_range(slot);
@@ -415,9 +439,8 @@ impl VertexTree for MetaNodeTree {
         }
     }
 
-    fn settle(&mut self) -> Result<(), TreeError> {
-        self.pager.settle();
-        Ok(())
+    fn settle(&mut self) -> Result<Duration, TreeError> {
+        Ok(self.pager.settle())
     }
 
     #[track_caller]

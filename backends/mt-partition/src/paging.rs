@@ -6,6 +6,10 @@
 //! the other, however little memory there is: nothing else has to stay, as the displayed patches do not depend on the
 //! records that they came from, and the engine keeps the bounds of the nodes in play.
 //!
+//! The paper reads what its traversal comes upon, and goes on when it is there. Here a change is refused until its group has come, so that
+//! no frame waits; what is read and what is kept is as printed ([`Prefetch::Paper`]). Whoever wants it as printed waits for
+//! [`settle`](vertex_tree::VertexTree::settle) and asks again, as foldfront's `Settled` does (`--prefetch blocking`).
+//!
 //! Groups come first. What is foreseen (`foresight`) is fetched behind them and has to make do with the room that they
 //! leave (`room`).
 //!
@@ -339,10 +343,10 @@ impl Paging {
         self.answers = answers;
     }
 
-    /// Waits for all that has been asked for.
-    pub fn settle(&mut self) {
+    /// Waits for all that has been asked for. Returns how long that took.
+    pub fn settle(&mut self) -> Duration {
         let answers = &mut self.answers;
-        self.line.settle(|answer| answers.push(answer));
+        self.line.settle(|answer| answers.push(answer))
     }
 
     /// Asks for everything that there is room for, and from now on lets go of nothing unless room is needed.

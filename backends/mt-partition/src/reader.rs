@@ -16,7 +16,7 @@ use std::collections::BTreeMap;
 use std::ops::Range;
 use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
 use std::sync::{Arc, Condvar, Mutex, MutexGuard, PoisonError};
-use std::time::Duration;
+use std::time::{Duration, Instant};
 
 use crossbeam_channel::{Receiver, Sender, unbounded};
 use vertex_tree::simulated::{self, Reads, Simulated};
@@ -279,11 +279,18 @@ impl Line {
         }
     }
 
-    /// Waits for all that has been asked for: in virtual time where that is what there is.
-    pub fn settle(&mut self, mut f: impl FnMut(Answer)) {
-        if let Queue { requests, clock: Some(clock), .. } = &mut *self.shared().queue() {
-            clock.line.settle(&mut Waiting(requests));
-        }
+    /// Waits for all that has been asked for: in virtual time where that is what there is. Returns how long that took.
+    pub fn settle(&mut self, f: impl FnMut(Answer)) -> Duration {
+        let virtually = match &mut *self.shared().queue() {
+            Queue { requests, clock: Some(clock), .. } => Some(clock.line.settle(&mut Waiting(requests))),
+            _ => None,
+        };
+        let start = Instant::now();
+        self.take_all(f);
+        virtually.unwrap_or_else(|| start.elapsed())
+    }
+
+    fn take_all(&mut self, mut f: impl FnMut(Answer)) {
         while self.under_way > 0 {
             // This end keeps a sender itself, so the channel can not be closed; a thread that has ended never answers.
             match self.answers.recv_timeout(Duration::from_millis(100)) {

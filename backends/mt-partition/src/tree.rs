@@ -286,9 +286,9 @@ impl VertexTree for MtTree {
         self.paging.give_up(node.0);
     }
 
-    fn settle(&mut self) -> Result<(), TreeError> {
-        self.paging.settle();
-        self.check_reader()
+    fn settle(&mut self) -> Result<std::time::Duration, TreeError> {
+        let waited = self.paging.settle();
+        self.check_reader().map(|()| waited)
     }
 
     fn end_frame(&mut self) -> Result<PageStats, TreeError> {

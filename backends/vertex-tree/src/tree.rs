@@ -1,5 +1,7 @@
 //! The trait between the engine and the storage backends.
 
+use std::time::Duration;
+
 use crate::{Bounds, MeshSink, NormalCone};
 
 /// Number of an inner node (a collapse) in a backend's own numbering, less than [`VertexTree::node_limit`].
@@ -57,6 +59,9 @@ pub struct PageStats {
     /// Changes refused since the last call because what is in memory could not make room, not because the store is
     /// slow.
     pub no_room: u64,
+    /// How long changes have waited for the store since the last call. No backend lets them; whoever makes them wait, as
+    /// foldfront's `Settled`, says so here.
+    pub stalled: Duration,
 }
 
 /// What fetches pages before a change needs them.
@@ -242,7 +247,7 @@ pub trait VertexTree {
     ///
     /// # Errors
     /// Those of [`begin_frame`](Self::begin_frame).
-    fn pass(&mut self, time: std::time::Duration) -> Result<(), TreeError> {
+    fn pass(&mut self, time: Duration) -> Result<(), TreeError> {
         let _ = time;
         Ok(())
     }
@@ -261,12 +266,13 @@ pub trait VertexTree {
         let _ = node;
     }
     /// Waits until every page that has been asked for has arrived or failed: for replays whose cuts shall be comparable,
-    /// and for a first frame. Nothing else here may wait.
+    /// for a first frame, and for whoever would rather wait than show less. Nothing else here may wait. Returns how long
+    /// that took, by the clock of the store: virtual time where the store is on virtual time.
     ///
     /// # Errors
     /// Those of [`begin_frame`](Self::begin_frame).
-    fn settle(&mut self) -> Result<(), TreeError> {
-        Ok(())
+    fn settle(&mut self) -> Result<Duration, TreeError> {
+        Ok(Duration::ZERO)
     }
     /// Checks what the backend knows of its own state, between two frames: for tests. The engine's own check calls it.
     ///

@@ -42,7 +42,7 @@ impl Pager {
         self.stats.read_bytes += 4 * self.file.page_words(page) as u64;
         self.stats.ahead += u64::from(!demanded);
         self.table[page as usize] = holder;
-        self.under_way -= words.len() as u64;
+        self.under_way -= self.place_words(words.len());
         self.resident += 1;
         let touched = if demanded { self.frame } else { 0 };
         self.holders[holder as usize] =

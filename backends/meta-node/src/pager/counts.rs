@@ -46,6 +46,10 @@ impl Pager {
         if std::mem::take(&mut slot.ahead) {
             self.stats.ahead_used += 1;
         }
+        // In the paper a page is what its counts make of it.
+        if self.is_printed() {
+            return;
+        }
         self.classify(self.holders[holder as usize].page);
         if let Some(class) = self.lists.class(holder) {
             self.lists.push(holder, class);
@@ -92,11 +96,13 @@ impl Pager {
         for page in parent.into_iter().chain(first_child..first_child + children) {
             let count = &mut self.references[page as usize];
             *count = if in_use { *count + 1 } else { count.saturating_sub(1) };
-            if *count == u16::from(in_use) {
+            let is_first = *count == u16::from(in_use);
+            if is_first {
                 self.classify(page);
-                if in_use {
-                    self.prefetch(page);
-                }
+            }
+            // In the paper every reference to a page that is not there asks for it.
+            if in_use && (is_first || self.is_printed()) {
+                self.prefetch(page);
             }
         }
         self.guarded = guarded;
@@ -110,7 +116,7 @@ impl Pager {
             return;
         }
         let untouched = self.holders[holder as usize].touched == 0;
-        let stays = self.in_use == InUse::Stays && self.usage[page as usize] > 0;
+        let stays = self.in_use != InUse::Yields && self.usage[page as usize] > 0;
         let class = match (self.usage[page as usize], self.references[page as usize]) {
             _ if !stays && self.foresight.is_foreseen(page) => Class::Foreseen,
             (0, 0) => Class::Free,

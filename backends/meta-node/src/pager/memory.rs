@@ -3,6 +3,7 @@
 use super::{LEAST_HOLDERS, Pager};
 use crate::error::MetaNodeError;
 use crate::lists::Class;
+use crate::settings::InUse;
 
 impl Pager {
     /// Sets how much memory the place holders may take. Less than now takes effect at once.
@@ -13,7 +14,11 @@ impl Pager {
             return Err(MetaNodeError::Memory { given: bytes, least, holders: LEAST_HOLDERS });
         }
         // Room for three that are not in use, even where all are.
-        let most = self.file.header.page_bytes.saturating_add(largest * u64::from(LEAST_HOLDERS));
+        let all = match self.in_use {
+            InUse::Printed => largest.saturating_mul(self.file.header.pages.into()),
+            InUse::Yields | InUse::Stays => self.file.header.page_bytes,
+        };
+        let most = all.saturating_add(largest * u64::from(LEAST_HOLDERS));
         let allowed = bytes.min(most) / 4;
         if self.is_complete() && allowed < self.taken {
             self.recount();
@@ -22,7 +27,7 @@ impl Pager {
         // Roots stay, unless a forest of thousands of trees would leave no room for anything else.
         let roots = self.file.header.root_pages;
         let words = (0..roots).map(|page| self.file.page_words(page) as u64).sum::<u64>();
-        let kept = if words <= allowed / 2 { roots } else { 0 };
+        let kept = if words <= allowed / 2 && !self.is_printed() { roots } else { 0 };
         let before = std::mem::replace(&mut self.kept, kept);
         for page in 0..before.max(kept) {
             self.classify(page);

@@ -32,7 +32,7 @@ impl Pager {
 
     /// A command that has been taken back, or has failed, gives its place holder up.
     pub(super) fn release(&mut self, command: &Command) {
-        let words = command.words.len() as u64;
+        let words = self.place_words(command.words.len());
         self.table[command.page as usize] = NONE;
         self.news.push(command.page);
         self.taken -= words;
@@ -45,7 +45,7 @@ impl Pager {
     /// A node has been unfolded: the pages to which the nodes below it lead may be needed next.
     #[inline(always)]
     pub fn look_ahead(&mut self, holder: u32, slot: u32) {
-        if self.how == Prefetch::Paper && !self.is_complete() {
+        if self.how == Prefetch::Paper && !self.is_printed() && !self.is_complete() {
             self.look_below(holder, slot);
         }
     }
@@ -74,10 +74,12 @@ impl Pager {
     }
 
     /// The first place holder of a list, if it may be taken: not if it has been touched in this frame, or has come in
-    /// answer to an urgent request at its start.
+    /// answer to an urgent request at its start. The paper knows no such grace.
     pub(super) fn takeable(&self, class: Class, before: u64) -> Option<u32> {
-        let is_free =
-            |&holder: &u32| holder != self.guarded && self.holders[holder as usize].touched < before;
+        let is_free = |&holder: &u32| {
+            let has_grace = !self.is_printed() && self.holders[holder as usize].touched >= before;
+            holder != self.guarded && !has_grace
+        };
         self.lists.front(class).filter(is_free)
     }
 
@@ -89,7 +91,7 @@ impl Pager {
 
     /// Makes room for a page, by what `give` drops each time. Says whether there is enough.
     pub(super) fn make_room(&mut self, page: u32, mut give: impl FnMut(&mut Self) -> bool) -> bool {
-        let words = self.file.page_words(page) as u64;
+        let words = self.place_words(self.file.page_words(page));
         while self.taken + words > self.allowed {
             if !give(self) {
                 return false;
@@ -113,7 +115,7 @@ impl Pager {
         }
         let has_room = !self.rests(page)
             && match self.in_use {
-                InUse::Stays => self.make_room(page, Self::give_free),
+                InUse::Stays | InUse::Printed => self.make_room(page, Self::give_free),
                 InUse::Yields => {
                     let before = self.frame.saturating_sub(IDLE).max(1);
                     self.make_room(page, |pager| pager.evict_one(pager.oldest(before)))
@@ -139,7 +141,11 @@ impl Pager {
         }
     }
 
+    /// Leaves a page for later. In the paper it is left until something refers to it anew.
     pub(super) fn give_up(&mut self, page: u32) {
+        if self.is_printed() {
+            return;
+        }
         if self.given_up.len() == MOST_GIVEN_UP {
             self.given_up.pop_front();
         }
@@ -204,7 +210,7 @@ impl Pager {
     pub(super) fn unused(&self) -> Option<u32> {
         match self.in_use {
             InUse::Yields => self.oldest(self.frame),
-            InUse::Stays => [Class::Free, Class::Prefetched]
+            InUse::Stays | InUse::Printed => [Class::Free, Class::Prefetched]
                 .into_iter()
                 .find_map(|class| self.takeable(class, self.frame)),
         }
@@ -214,6 +220,9 @@ impl Pager {
     fn give_way(&mut self, switch: Switch) -> bool {
         if self.evict_one(self.unused()) || self.withdraw(false) {
             return true;
+        }
+        if self.is_printed() {
+            return false;
         }
         let farthest = self.farthest(self.frame, 0);
         let is_up = switch == Switch::Up;
@@ -229,8 +238,8 @@ impl Pager {
     /// Asks for a page for which there is room.
     pub(super) fn ask(&mut self, page: u32, urgent: bool) {
         let words: Box<[u32]> = vec![0; self.file.page_words(page)].into();
-        self.taken += words.len() as u64;
-        self.under_way += words.len() as u64;
+        self.taken += self.place_words(words.len());
+        self.under_way += self.place_words(words.len());
         let slot = Holder { page, demanded: urgent, ..Holder::default() };
         let holder = match self.empty.pop() {
             Some(holder) => {

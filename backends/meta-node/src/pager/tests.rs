@@ -162,3 +162,86 @@ fn the_free_list_is_in_order_of_flushing() {
         pager.assert_well_formed();
     }
 }
+
+/// The pages without any below them.
+fn leaves(pager: &Pager) -> Vec<u32> {
+    let mut words = Vec::new();
+    let is_leaf = |&page: &u32| {
+        words.resize(pager.file.page_words(page), 0);
+        pager.file.read_page(page, &mut words).unwrap().children == 0
+    };
+    (0..pager.file.header.pages).filter(is_leaf).collect()
+}
+
+/// As printed: place holders are of one size, pages in use stay, and three that are not in use are kept from switching down.
+#[test]
+fn as_printed_three_place_holders_are_kept_from_switching_down() {
+    let mut pager = pager(InUse::Printed, Prefetch::None);
+    let largest = u64::from(pager.file.header.largest_words);
+    let holders = pager.allowed / largest;
+    assert!(holders < u64::from(pager.file.header.pages), "{holders}");
+    let mut in_use = Vec::new();
+    let mut refused = None;
+    for page in leaves(&pager) {
+        pager.urge(page, super::Switch::Down);
+        frame(&mut pager);
+        assert!(pager.taken.is_multiple_of(largest) && pager.taken <= pager.allowed);
+        if pager.find(page).is_none() {
+            refused = Some(page);
+            break;
+        }
+        pager.count_usage(page, 1);
+        in_use.push(page);
+        frame(&mut pager);
+    }
+    let refused = refused.expect("not all of them fit");
+    assert_eq!(in_use.len() as u64, holders - 2, "with two left that are not in use");
+    assert!(in_use.iter().all(|&page| class(&pager, page) == Some(Class::InUse)));
+    // Switching up is always allowed, and takes no page that is in use.
+    pager.urge(refused, super::Switch::Up);
+    frame(&mut pager);
+    assert!(pager.find(refused).is_some());
+    assert!(in_use.iter().all(|&page| pager.find(page).is_some()));
+    // One that is let go of makes room for the next.
+    pager.count_usage(in_use[0], -1);
+    let other = leaves(&pager).into_iter().find(|&page| pager.find(page).is_none()).unwrap();
+    pager.urge(other, super::Switch::Down);
+    frame(&mut pager);
+    assert!(pager.find(other).is_some());
+}
+
+/// As printed: where there is no free place holder, what is only likely to be needed is not fetched, now or later, until
+/// something refers to it anew.
+#[test]
+fn as_printed_what_is_given_up_is_not_tried_again() {
+    let mut pager = pager(InUse::Printed, Prefetch::Paper);
+    let page = inner_page(&pager);
+    pager.urge(page, super::Switch::Up);
+    frame(&mut pager);
+    // All the others are taken by what is in use.
+    let Layout { first_child, children, .. } = layout(&pager, page);
+    let below: Vec<u32> = (first_child..first_child + children).collect();
+    let others: Vec<u32> = leaves(&pager).into_iter().filter(|leaf| !below.contains(leaf)).collect();
+    for &other in &others {
+        pager.urge(other, super::Switch::Up);
+        frame(&mut pager);
+        if pager.find(other).is_some() {
+            pager.count_usage(other, 1);
+        }
+    }
+    pager.count_usage(page, 1);
+    frame(&mut pager);
+    let missing: Vec<u32> = below.into_iter().filter(|&child| pager.find(child).is_none()).collect();
+    assert!(!missing.is_empty(), "all of it is there");
+    for &other in &others[..others.len() / 2] {
+        if pager.usage[other as usize] > 0 {
+            pager.count_usage(other, -1);
+        }
+    }
+    assert_eq!(frame(&mut pager), 0, "something was tried again");
+    assert!(missing.iter().all(|&child| pager.find(child).is_none()));
+    pager.count_usage(page, -1);
+    pager.count_usage(page, 1);
+    frame(&mut pager);
+    assert!(missing.iter().all(|&child| pager.find(child).is_some()), "they are referred to anew");
+}

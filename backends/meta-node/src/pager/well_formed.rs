@@ -24,7 +24,7 @@ impl Pager {
                 continue;
             }
             resident += 1;
-            words += holder.words.len() as u64;
+            words += self.place_words(holder.words.len());
             if holder.counted {
                 let Layout { parent, first_child, children, .. } = holder.layout;
                 let parent = Some(parent).filter(|&parent| parent != NONE);
