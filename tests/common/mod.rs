@@ -7,7 +7,9 @@ pub mod data;
 pub mod detail_block;
 pub mod foreseen;
 pub mod graph_cut;
+pub mod meshes;
 pub mod sink;
+pub mod trajectories;
 
 use foldfront::view::View;
 use foldfront::{Bounds, Collapse, CollapseLog, Mesh};
