@@ -100,8 +100,9 @@ fn optical(right: DVec3, up: DVec3, forward: DVec3) -> DMat3 {
 /// Over a terrain of width 1, in Hoppe's format: a frame a line, x forward, y left, z up.
 pub fn flight(seconds: usize) -> String {
     let samples = samples(seconds, [30.0, 8.0], &mut Random(34), |_, place, aim| {
-        let eye = DVec3::new(0.5, 0.25, 0.06) + DVec3::new(0.5, 0.25, 0.03) * place;
-        [eye, DVec3::new(aim.x, aim.y, -0.2)]
+        let middle = DVec3::new(0.5, 0.25, 0.0);
+        let eye = middle + DVec3::new(0.5 * place.x, 0.25 * place.y, 0.06 + 0.03 * place.z);
+        [eye, (middle - eye + 0.2 * aim).with_z(-0.15)]
     });
     let mut text = String::new();
     for Sample(_, eye, forward, up) in samples {

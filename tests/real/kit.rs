@@ -57,3 +57,9 @@ pub fn mesh(file: PathBuf) -> Mesh {
 pub fn log(file: PathBuf) -> CollapseLog {
     data::log(mesh(file))
 }
+
+/// What a file is called, for the name of a trial.
+pub fn stem(file: &str) -> &str {
+    let name = file.rsplit('/').next().unwrap_or(file);
+    name.split('.').next().unwrap_or(name)
+}

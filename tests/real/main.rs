@@ -4,9 +4,19 @@
 #[path = "../common/mod.rs"]
 mod common;
 mod conformance;
+#[path = "../checks/hierarchy.rs"]
+mod hierarchy;
 mod kit;
+mod refinement;
+#[path = "../simplify/replay.rs"]
+mod replay;
+mod simplify;
+#[path = "../checks/unfolding.rs"]
+mod unfolding;
 #[path = "../checks/walks.rs"]
 mod walks;
+#[path = "../checks/within.rs"]
+mod within;
 
 use std::process::ExitCode;
 use std::thread::available_parallelism;
@@ -21,6 +31,7 @@ fn main() -> ExitCode {
     let mut arguments = Arguments::from_args();
     let threads = available_parallelism().map_or(1, |threads| threads.get().min(MOST_THREADS));
     arguments.test_threads = arguments.test_threads.or(Some(threads));
-    let trials: Vec<Trial> = [conformance::trials()].into_iter().flatten().collect();
+    let trials: Vec<Trial> =
+        [conformance::trials(), refinement::trials(), simplify::trials()].into_iter().flatten().collect();
     run(&arguments, trials).exit_code()
 }
