@@ -26,8 +26,11 @@ fn engine<M: MeshSink>(
 }
 
 /// Along random walks, with one view and with two, every strategy has the cut that brute force finds with cones: nothing is
-/// forced, as cones are nested over all needs, and the mesh is as well formed as ever. And it is a smaller cut.
-pub fn what_is_seen_from_behind_stays_coarse(log: &CollapseLog) {
+/// forced, as cones are nested over all needs, and the mesh is as well formed as ever. And it is a smaller cut, by
+/// this share, in percent: cones of nodes are nested, so that it takes a smooth surface for them to be narrow while nodes
+/// are large. A ball seen at `k` = 3000 spares 25 %, the horse next to nothing at 300 and more than 10 % at 40,000, where
+/// nearly all of it is unfolded.
+pub fn what_is_seen_from_behind_stays_coarse(log: &CollapseLog, k: f64, spared: u64) {
     for quantize in [false, true] {
         let arrangement = Arrangement::new(log, &options(quantize, true)).unwrap();
         let effective = arrangement.effective_log();
@@ -41,7 +44,7 @@ pub fn what_is_seen_from_behind_stays_coarse(log: &CollapseLog) {
         let strategies = [Strategy::TopDown, Strategy::Front, Strategy::Event];
         let mut engines = strategies.map(|strategy| engine(&file, ActiveMesh::new(), log, strategy));
         let mut random = Random(21);
-        let mut view = random_view(&mut random).with_k(40_000.0).unwrap();
+        let mut view = random_view(&mut random).with_k(k).unwrap();
         let (mut with, mut without, mut event_tests, mut front_tests) = (0, 0, 0, 0);
         for frame in 0..240 {
             random_step(&mut view, &mut random);
@@ -75,7 +78,7 @@ pub fn what_is_seen_from_behind_stays_coarse(log: &CollapseLog) {
         eprintln!(
             "{with} active nodes, {without} without; {event_tests} tests by events, {front_tests} by scans"
         );
-        assert!(with * 10 < without * 9, "{with} active nodes, {without} without cones");
+        assert!(with * 100 < without * (100 - spared), "{with} active nodes, {without} without cones");
         assert!(event_tests * 2 < front_tests, "{event_tests} tests by events, {front_tests} by scans");
     }
 }

@@ -55,8 +55,16 @@ fn compact(mesh: &mut Mesh) {
     mesh.positions = positions;
 }
 
-/// A closed surface of this genus, without a defect: a slab with so many tunnels, its edges worn, with bumps of all sizes.
-/// `side` is the number of edges along a tunnel.
+/// A closed surface of this genus, without a defect: a [slab] with so many tunnels, its edges worn, with bumps of all
+/// sizes.
+pub fn with_handles(genus: usize, side: usize) -> Mesh {
+    let mut mesh = slab(genus, side);
+    wear(&mut mesh, side / 2);
+    roughen(&mut mesh, 0.06);
+    mesh
+}
+
+/// A slab with so many tunnels. `side` is the number of edges along a tunnel.
 ///
 /// ```text
 /// +-----------------------+
@@ -65,7 +73,7 @@ fn compact(mesh: &mut Mesh) {
 /// |   +---+       +---+   |
 /// +-----------------------+
 /// ```
-pub fn with_handles(genus: usize, side: usize) -> Mesh {
+fn slab(genus: usize, side: usize) -> Mesh {
     let is_solid = |[x, y, z]: [isize; 3]| {
         let [x, y, z] = [x, y, z].map(|i| i.div_euclid(side as isize));
         let is_inside = (0..=2 * genus as isize).contains(&x) && (0..3).contains(&y) && z == 0;
@@ -101,12 +109,27 @@ pub fn with_handles(genus: usize, side: usize) -> Mesh {
             }
         }
     }
-    wear(&mut mesh, side / 2);
-    let outwards = normals(&mesh);
+    mesh
+}
+
+/// Moves every vertex outwards by noise up to about this height.
+fn roughen(mesh: &mut Mesh, height: f64) {
+    let outwards = normals(mesh);
     for (position, normal) in mesh.positions.iter_mut().zip(outwards) {
         let p = of(*position);
-        *position = (p + normal * 0.06 * relief(2.0 * p, 4, 7)).as_vec3().to_array();
+        *position = (p + normal * height * relief(2.0 * p, 4, 7)).as_vec3().to_array();
     }
+}
+
+/// A ball of radius 1 with bumps of this height, `14 * side * side` quads.
+pub fn ball(side: usize, bumps: f64) -> Mesh {
+    let mut mesh = slab(0, side);
+    for position in &mut mesh.positions {
+        let [x, y, z] = *position;
+        let p = DVec3::new(2.0 * f64::from(x) - 1.0, f64::from(y) / 1.5 - 1.0, 2.0 * f64::from(z) - 1.0);
+        *position = p.normalize().as_vec3().to_array();
+    }
+    roughen(&mut mesh, bumps);
     mesh
 }
 

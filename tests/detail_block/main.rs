@@ -78,7 +78,8 @@ fn a_bad_store_delays_and_no_more() {
 
 #[test]
 fn what_is_seen_from_behind_stays_coarse() {
-    facing::what_is_seen_from_behind_stays_coarse(&closed());
+    facing::what_is_seen_from_behind_stays_coarse(&data::log(meshes::ball(30, 0.0)), 3000.0, 20);
+    facing::what_is_seen_from_behind_stays_coarse(&data::log(meshes::with_handles(0, 20)), 40_000.0, 5);
 }
 
 #[test]
@@ -93,5 +94,5 @@ fn at_rest_the_cut_is_reached_or_loading_ends() {
 
 #[test]
 fn the_schedule_spares_misses() {
-    quotas::the_schedule_spares_misses(&closed());
+    quotas::the_schedule_spares_misses(&data::log(meshes::ball(40, 0.05)), 4.0);
 }

@@ -7,7 +7,9 @@ use libtest_mimic::Trial;
 use crate::facing::what_is_seen_from_behind_stays_coarse;
 use crate::flights::{a_bad_store_delays_and_no_more, flies, forced_cuts_are_the_closure};
 use crate::kit::{self, needs};
-use crate::quotas::{at_rest_the_cut_is_reached_or_loading_ends, the_hard_quota_holds, the_schedule_spares_misses};
+use crate::quotas::{
+    at_rest_the_cut_is_reached_or_loading_ends, the_hard_quota_holds, the_schedule_spares_misses,
+};
 
 /// Files, whether they are manifold, and whether they are closed.
 const FLYING: [(&str, bool, bool); 11] = [
@@ -46,10 +48,12 @@ pub fn trials() -> Vec<Trial> {
         joined,
         over("forced_cuts_are_the_closure", horse, |log| forced_cuts_are_the_closure(log, 1500)),
         over("a_bad_store_delays_and_no_more", bunny, a_bad_store_delays_and_no_more),
-        over("what_is_seen_from_behind_stays_coarse", horse, what_is_seen_from_behind_stays_coarse),
+        over("what_is_seen_from_behind_stays_coarse", horse, |log| {
+            what_is_seen_from_behind_stays_coarse(log, 40_000.0, 10);
+        }),
         over("the_hard_quota_holds_over_100_000_frames", bunny, |log| the_hard_quota_holds(log, 100_000)),
         over("at_rest_the_cut_is_reached_or_loading_ends", horse, at_rest_the_cut_is_reached_or_loading_ends),
-        over("the_schedule_spares_misses", horse, the_schedule_spares_misses),
+        over("the_schedule_spares_misses", horse, |log| the_schedule_spares_misses(log, 1.0)),
     ];
     flying.into_iter().chain(others).collect()
 }

@@ -53,7 +53,7 @@ pub fn trials() -> Vec<Trial> {
         real_mesh!(dragon_joined, "meshes/dragon.ply", true, .roots < 10),
         needs("simplify::is_deterministic", ["meshes/ogre.ply"], |[file]| is_deterministic(&kit::mesh(file))),
         needs("simplify::errors_are_honest", ["meshes/bunny.ply"], |[file]| {
-            errors_are_honest(&kit::mesh(file))
+            errors_are_honest(&kit::mesh(file));
         }),
         needs("simplify::within::the_memory_does_not_matter", ["meshes/bunny.ply"], |[file]| {
             within::the_memory_does_not_matter(&kit::mesh(file));

@@ -1,6 +1,8 @@
 //! Hierarchy construction: on meshes of all kinds, and on small ones made to be difficult. The real ones are in
 //! `tests/real`.
 
+#![expect(clippy::disallowed_methods, reason = "random shapes and motions, or figures to compare with")]
+
 #[path = "../common/mod.rs"]
 mod common;
 #[path = "../checks/hierarchy.rs"]
