@@ -1,4 +1,4 @@
-//! What several test files share: the table of backends, real data, a generator of random logs and views.
+//! What several test files share: the table of backends, made-up meshes and trajectories, a generator of random logs and views.
 #![expect(clippy::disallowed_methods, reason = "random shapes and motions, or figures to compare with")]
 #![allow(dead_code)]
 
