@@ -2,6 +2,10 @@
 
 #![expect(clippy::disallowed_methods, reason = "random shapes and motions, or figures to compare with")]
 
+#[path = "checks/arriving.rs"]
+mod arriving;
+mod common;
+
 use std::path::Path as FilePath;
 
 use foldfront::path::{Path, PathError, Pose, generate, recorded};
@@ -155,11 +159,11 @@ fn recorded_cameras_stay_above_the_surface() {
 
 mod importing {
     use foldfront::Mesh;
-    use foldfront::mesh_io;
-    use foldfront::path::Summary;
-    use foldfront::path::import::{ImportError, Mode, Options, Up, import, import_text};
+    use foldfront::path::import::{ImportError, Mode, Options, Up, import_text};
     use glam::DVec3;
 
+    use super::arriving::comes_to_in_every_mode;
+    use super::common::{Random, meshes, trajectories};
     use super::*;
 
     const POSES: &str = "0 0 0 1 0 0 0 1\n1 1 0 1 0 0 0 1\n2 1 1 2 0 0 0 1\n3 0 1 1 0 0 0 1\n";
@@ -335,37 +339,25 @@ mod importing {
         }
     }
 
-    /// Every recorded trajectory, brought to terrain, a town and scanned objects in every mode.
+    /// Trajectories of all kinds, brought to terrain, a town, scanned and closed objects in every mode.
     #[test]
-    fn real_trajectories_come_to_real_meshes() {
-        let data = FilePath::new(concat!(env!("CARGO_MANIFEST_DIR"), "/../shared/data"));
-        if !data.exists() {
-            return;
-        }
-        let read = |name: &str| mesh_io::read(&[data.join(name)], &mut |_, _| ()).unwrap();
-        let meshes = [
-            read("meshes/bunny.ply"),
-            read("meshes/dragon.ply"),
-            read("terrain/N37W119.hgt"),
-            Scene::new(SceneKind::City).mesh(&mut |_, _| ()),
+    fn trajectories_come_to_meshes() {
+        let made_up = [
+            ("drone", trajectories::drone(20)),
+            ("car", trajectories::car(40)),
+            ("hand-held", trajectories::hand_held(20)),
+            ("flight", trajectories::flight(40)),
         ];
-        let mut trajectories: Vec<_> =
-            std::fs::read_dir(data.join("paths")).unwrap().map(|entry| entry.unwrap().path()).collect();
-        trajectories.sort();
-        assert_eq!(trajectories.len(), 6);
-        for trajectory in &trajectories {
-            for mesh in &meshes {
-                for mode in [Mode::Fly, Mode::Walk, Mode::Orbit] {
-                    // The flight lasts ten hours.
-                    let rate = if trajectory.to_str().unwrap().contains("soaring") { 5.0 } else { 60.0 };
-                    let path =
-                        import(trajectory, mesh, &Options { mode, rate, ..Options::default() }).unwrap();
-                    let Summary { motion: [_, usual, largest], .. } = path.summary();
-                    let what = format!("{} {mode:?} {}", path.name, mesh.positions.len());
-                    assert!(path.frames.len() > 900, "{what}");
-                    assert!(usual.rho > 0.0 && usual.rho < 0.02 * mesh.extent(), "{what}: {usual:?}");
-                    assert!(largest.omega < 0.5, "{what}: {largest:?}");
-                }
+        for mesh in [
+            meshes::scan(10, &mut Random(1)),
+            meshes::with_handles(5, 8),
+            meshes::ground(100, 5, &mut Random(2)),
+            meshes::part_of(SceneKind::City, 0.3),
+        ] {
+            for (name, text) in &made_up {
+                comes_to_in_every_mode(&mesh, 900, |options| {
+                    import_text(FilePath::new(name), text, &mesh, options).unwrap()
+                });
             }
         }
     }

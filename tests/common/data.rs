@@ -1,20 +1,7 @@
-//! Real meshes and trajectories, where they are at hand, and hierarchies of meshes.
-
-use std::path::{Path, PathBuf};
+//! Hierarchies of meshes.
 
 use foldfront::cut::{Displayed, uniform_cut};
-use foldfront::{CollapseLog, Mesh, mesh_io, simplify};
-
-/// A file or folder among the shared data; `None` where there is no such data, and the test has nothing to do.
-pub fn shared(name: &str) -> Option<PathBuf> {
-    let path = Path::new(concat!(env!("CARGO_MANIFEST_DIR"), "/../shared/data")).join(name);
-    path.exists().then_some(path)
-}
-
-/// A mesh among the shared data.
-pub fn mesh(name: &str) -> Option<Mesh> {
-    shared(name).map(|file| mesh_io::read(&[file], &mut |_, _| ()).unwrap())
-}
+use foldfront::{CollapseLog, Mesh, simplify};
 
 /// The hierarchy of a mesh.
 pub fn log(mesh: Mesh) -> CollapseLog {

@@ -1,4 +1,4 @@
-//! What several test files share: the table of backends, real data, a generator of random logs and views.
+//! What several test files share: the table of backends, made-up meshes and trajectories, a generator of random logs and views.
 #![expect(clippy::disallowed_methods, reason = "random shapes and motions, or figures to compare with")]
 #![allow(dead_code)]
 
@@ -7,7 +7,9 @@ pub mod data;
 pub mod detail_block;
 pub mod foreseen;
 pub mod graph_cut;
+pub mod meshes;
 pub mod sink;
+pub mod trajectories;
 
 use foldfront::view::View;
 use foldfront::{Bounds, Collapse, CollapseLog, Mesh};

@@ -1,147 +1,60 @@
-//! Trees of detail blocks under the engine: all data build and fly, quotas hold, forced cuts are what they should be.
+//! Trees of detail blocks under the engine: all kinds of meshes build and fly, quotas hold, forced cuts are what they
+//! should be. Real meshes are in `tests/real`.
 
 #[path = "../common/mod.rs"]
 mod common;
 mod cones;
+#[path = "../checks/cones.rs"]
+mod facing;
+#[path = "../checks/flights.rs"]
+mod flights;
 mod paging;
+#[path = "../checks/quotas.rs"]
+mod quotas;
 
-use std::collections::HashSet;
-use std::sync::Arc;
-use std::time::Duration;
-
-use common::detail_block::{OwnCut, advance_settled, file, options, reading};
-use common::{Random, data, random_step, random_view};
-use detail_block::{Arrangement, Io, XfmFile, XfmTree};
-use foldfront::active_mesh::ActiveMesh;
-use foldfront::criterion::Criterion;
-use foldfront::engine::{Engine, Settings};
-use foldfront::front::mix;
-use foldfront::path::around;
-use foldfront::refine::Strategy;
+use common::{Random, data, meshes};
+use flights::flies;
+use foldfront::CollapseLog;
 use foldfront::scene::{Scene, SceneKind};
 use foldfront::simplify;
-use foldfront::vertex_tree::source::{Faults, Faulty, MemorySource};
-use foldfront::vertex_tree::{NONE, VertexTree};
-use foldfront::view::{View, theta_of_pixels};
-use foldfront::{CollapseLog, Mesh};
-use glam::DVec3;
 
-/// A view of a walk around the origin, brought to a mesh.
-fn placed(mesh: &Mesh, view: View) -> View {
-    let (lo, hi) = mesh.bounding_box().unwrap();
-    let [lo, hi] = [lo, hi].map(|p| DVec3::from(p.map(f64::from)));
-    view.with_eye((lo + hi) / 2.0 + mesh.extent() / 2.0 * view.eye()).unwrap()
+fn closed() -> CollapseLog {
+    data::log(meshes::with_handles(2, 14))
 }
 
-fn settings(mesh: &Mesh, strategy: Strategy) -> Settings {
-    Settings { strategy, rho: 0.01 * mesh.extent(), ..Settings::default() }
-}
-
-/// Builds a file of a log, checks all of it, and flies around: every cut that is looked at is the brute-force one and a
-/// manifold mesh, closed where the input is.
-fn flies(name: &str, log: &CollapseLog, is_manifold: bool, is_closed: bool) {
-    let arrangement = Arrangement::new(log, &options(false, true)).unwrap();
-    let report = arrangement.report();
-    eprintln!("{name}: {report:?}");
-    if is_manifold {
-        let split = (report.cut_edges, report.added_vertices, report.left_out);
-        assert_eq!(split, (0, 0, 0), "{name} is manifold");
-    }
-    let file = file(&arrangement);
-    file.verify().unwrap();
-    let effective = arrangement.effective_log();
-    drop(arrangement);
-    let mut cut = OwnCut::new(&effective);
-    let path = around(&log.mesh).unwrap();
-    let tree = XfmTree::new(file, reading(Io::Blocking)).unwrap();
-    let settings = settings(&log.mesh, Strategy::Event);
-    let mut engine = Engine::new(tree, ActiveMesh::new(), settings).unwrap();
-    let mut most = 0;
-    for frame in (0..path.frames.len()).step_by(60) {
-        let view = path.view(frame, theta_of_pixels(1.0, 1080)).unwrap();
-        let report = advance_settled(&mut engine, &[view]);
-        let found = (report.cut_hash, report.active_nodes, report.triangles);
-        assert_eq!(found, cut.find(&settings, engine.views()), "{name}, frame {frame}");
-        assert_eq!(report.forced, 0, "{name}, frame {frame}: bounds are nested over all needs");
-        engine.assert_well_formed();
-        if is_closed {
-            assert_closed(engine.mesh());
-        }
-        most = report.triangles.max(most);
-    }
-    assert!(most > report.initial_faces + 1000, "{name}: next to nothing is shown");
-    // Looking in all directions, with every sphere too large: the input, triangle for triangle.
-    let settings = Settings { criterion: Criterion::SphereSize, ..settings };
-    let tree = XfmTree::new(engine.tree().file().clone(), reading(Io::Blocking)).unwrap();
-    let mut engine = Engine::new(tree, ActiveMesh::new(), settings).unwrap();
-    let ahead = path.view(0, 1.0).unwrap().with_cone(0.5, 0.75_f64.sqrt()).unwrap().with_k(1e15).unwrap();
-    let views = [DVec3::X, DVec3::Y, DVec3::Z].map(|d| [d, -d]).as_flattened().to_vec();
-    let views: Vec<View> = views.iter().map(|&direction| ahead.with_direction(direction).unwrap()).collect();
-    advance_settled(&mut engine, &views);
-    engine.assert_well_formed();
-    let key = |mesh: &Mesh, corners: &[u32; 3]| {
-        let [a, b, c] = corners.map(|v| mesh.positions[v as usize].map(f32::to_bits));
-        [a, b, c].min([b, c, a]).min([c, a, b])
-    };
-    let keys = |mesh: &Mesh| {
-        let shown = mesh.triangles.iter().filter(|[a, b, c]| a != b && b != c && c != a);
-        let mut keys: Vec<_> = shown.map(|t| key(mesh, t)).collect();
-        keys.sort_unstable();
-        keys
-    };
-    assert!(keys(&engine.mesh().to_mesh()) == keys(&log.mesh), "{name}: fully refined it is not the input");
-}
-
-fn assert_closed(mesh: &ActiveMesh) {
-    let edges: HashSet<(u32, u32)> =
-        mesh.displayed_triangles().flat_map(|(_, [a, b, c])| [(a, b), (b, c), (c, a)]).collect();
-    assert_eq!(edges.len(), 3 * mesh.displayed());
-    assert!(edges.iter().all(|&(a, b)| edges.contains(&(b, a))), "a hole in a closed mesh");
-}
-
-fn mesh_flies(name: &str, is_manifold: bool, is_closed: bool) {
-    if let Some(mesh) = data::mesh(name) {
-        flies(name, &data::log(mesh), is_manifold, is_closed);
-    }
+fn scan() -> CollapseLog {
+    data::log(meshes::scan(16, &mut Random(1)))
 }
 
 #[test]
-fn closed_scans_fly() {
-    for name in ["horse", "armadillo_100k", "lucy_100k", "turbineblade_200k"] {
-        mesh_flies(&format!("meshes/{name}.ply"), true, true);
+fn closed_surfaces_fly() {
+    for (genus, side) in [(0, 40), (3, 20), (20, 8)] {
+        flies(&format!("genus {genus}"), &data::log(meshes::with_handles(genus, side)), true, true);
     }
-}
-
-#[test]
-fn the_buddha_flies() {
-    mesh_flies("meshes/happy.ply", true, true);
 }
 
 #[test]
 fn open_scans_fly() {
-    mesh_flies("meshes/bunny.ply", true, false);
-    mesh_flies("meshes/dragon.ply", true, false);
+    flies("scan", &scan(), true, false);
 }
 
 #[test]
 fn meshes_that_are_not_manifold_fly() {
-    mesh_flies("meshes/ogre.ply", false, false);
-    mesh_flies("meshes/beast.ply", false, false);
+    flies("patchwork", &data::log(meshes::patchwork(16, &mut Random(2))), false, false);
 }
 
 #[test]
 fn towns_fly() {
-    mesh_flies("city/denhaag01_lod2_terrain.obj", true, false);
-    mesh_flies("city/boston_blocks.obj", true, false);
+    flies("town", &data::log(meshes::part_of(SceneKind::City, 0.5)), true, false);
 }
 
 /// Virtual merges of components are none of a manifold mesh: they are left out, and there are more roots.
 #[test]
 fn joined_components_fly_apart() {
-    let Some(mesh) = data::mesh("city/denhaag01_lod2_terrain.obj") else { return };
     let mut options = simplify::Options::default();
     options.merge_components = true;
-    let (log, _) = simplify::build(mesh, &options, &mut |_, _| ()).unwrap();
+    let town = meshes::part_of(SceneKind::City, 0.5);
+    let (log, _) = simplify::build(town, &options, &mut |_, _| ()).unwrap();
     flies("joined", &log, false, false);
 }
 
@@ -153,90 +66,33 @@ fn built_in_scenes_fly() {
     }
 }
 
-/// Bounds that are not nested over needs: what is displayed is the closure of what is wanted, with every strategy.
 #[test]
 fn forced_cuts_are_the_closure() {
-    let Some(mesh) = data::mesh("meshes/horse.ply") else { return };
-    let log = data::log(mesh);
-    let arrangement = Arrangement::new(&log, &options(false, false)).unwrap();
-    let (effective, needs) = (arrangement.effective_log(), arrangement.needs());
-    let forest = effective.forest().unwrap();
-    let file = file(&arrangement);
-    let mut oracle = OwnCut::new(&effective).oracle;
-    let strategies = [Strategy::TopDown, Strategy::Front, Strategy::Event];
-    let mut engines = strategies.map(|strategy| {
-        let tree = XfmTree::new(file.clone(), reading(Io::Blocking)).unwrap();
-        Engine::new(tree, ActiveMesh::new(), settings(&log.mesh, strategy)).unwrap()
-    });
-    let mut random = Random(8);
-    let mut view = random_view(&mut random).with_k(300.0).unwrap();
-    let (mut forced, mut changes) = (0, 0);
-    let mut stack = Vec::new();
-    for frame in 0..1500 {
-        random_step(&mut view, &mut random);
-        let views = [placed(&log.mesh, view)];
-        let mut active = oracle.cut(engines[0].settings().criterion, &views).to_vec();
-        stack.extend((0..active.len()).filter(|&n| active[n]));
-        while let Some(n) = stack.pop() {
-            for &m in needs[n].iter().chain(Some(&forest.parent[n]).filter(|&&p| p != NONE)) {
-                if !std::mem::replace(&mut active[m as usize], true) {
-                    stack.push(m as usize);
-                }
-            }
-        }
-        let numbers = (0..active.len() as u32).filter(|&n| active[n as usize]);
-        let expected = (numbers.clone().map(mix).fold(0, u64::wrapping_add), numbers.count() as u64);
-        for engine in &mut engines {
-            let report = engine.advance(&views).unwrap();
-            let name = engine.settings().strategy.name();
-            assert_eq!((report.cut_hash, report.active_nodes), expected, "{name}, frame {frame}");
-            (forced, changes) = (forced + report.forced, changes + report.unfolds);
-            if frame % 50 == 0 {
-                engine.assert_well_formed();
-                assert_closed(engine.mesh());
-            }
-        }
-    }
-    eprintln!("{forced} of {changes} unfolds were forced");
-    assert!(forced > 100 && changes > 10_000);
+    flights::forced_cuts_are_the_closure(&closed(), 500);
 }
 
-/// A store that fails, brings damaged pages and is late, and quotas on top: nothing wrong is shown, and when the store
-/// has recovered the cut is what it should be.
 #[test]
 fn a_bad_store_delays_and_no_more() {
-    let Some(mesh) = data::mesh("meshes/bunny.ply") else { return };
-    let log = data::log(mesh);
-    let arrangement = Arrangement::new(&log, &options(true, true)).unwrap();
-    let mut bytes = Vec::new();
-    arrangement.write_to(&mut bytes).unwrap();
-    let mut cut = OwnCut::new(&arrangement.effective_log());
-    for (seed, how) in [(1, Io::Background), (2, Io::Blocking)] {
-        let source = Arc::new(Faulty::new(MemorySource::new("m", bytes.clone()), seed, Faults::default()));
-        let file = Arc::new(XfmFile::open(source.clone()).unwrap());
-        let all = file.resident_bytes_of_all();
-        let mut tree = XfmTree::new(file, reading(how)).unwrap();
-        tree.set_quotas(all / 20, u64::MAX);
-        let settings = settings(&log.mesh, Strategy::Event);
-        let mut engine = Engine::new(tree, ActiveMesh::new(), settings).unwrap();
-        let mut random = Random(seed);
-        let mut view = random_view(&mut random).with_k(300.0).unwrap();
-        let delay = Duration::from_micros(100);
-        let mut faults = 0;
-        for round in 0..20 {
-            source.set(Faults { errors: 100, short: 100, flips: 100, delays: 20, delay });
-            for _ in 0..60 {
-                random_step(&mut view, &mut random);
-                faults += engine.advance(&[placed(&log.mesh, view)]).unwrap().pages.faults;
-            }
-            engine.assert_well_formed();
-            source.set(Faults::default());
-            engine.tree_mut().settle().unwrap();
-            let report = advance_settled(&mut engine, &[placed(&log.mesh, view)]);
-            let found = (report.cut_hash, report.active_nodes, report.triangles);
-            assert_eq!(found, cut.find(&settings, engine.views()), "round {round}");
-        }
-        eprintln!("{faults} faults counted, {} befallen, {:?}", source.befallen(), engine.tree().counts());
-        assert!(source.befallen() > 200 && faults > 200);
-    }
+    flights::a_bad_store_delays_and_no_more(&scan());
+}
+
+#[test]
+fn what_is_seen_from_behind_stays_coarse() {
+    facing::what_is_seen_from_behind_stays_coarse(&data::log(meshes::ball(30, 0.0)), 3000.0, 20);
+    facing::what_is_seen_from_behind_stays_coarse(&data::log(meshes::with_handles(0, 20)), 40_000.0, 5);
+}
+
+#[test]
+fn the_hard_quota_holds() {
+    quotas::the_hard_quota_holds(&scan(), 20_000);
+}
+
+#[test]
+fn at_rest_the_cut_is_reached_or_loading_ends() {
+    quotas::at_rest_the_cut_is_reached_or_loading_ends(&closed());
+}
+
+#[test]
+fn the_schedule_spares_misses() {
+    quotas::the_schedule_spares_misses(&data::log(meshes::ball(40, 0.05)), 4.0);
 }

@@ -1,44 +1,26 @@
-//! Mesh files: every format in small, the real data, and every way in which a file can be wrong.
+//! Mesh files: every format in small, and every way in which a file can be wrong.
 
 mod heights;
 mod layout;
 mod maps;
 mod polygons;
 mod precision;
-mod real;
+#[path = "../checks/reading.rs"]
+mod reading;
 mod wrong;
 
 use std::fs;
 use std::io::{Cursor, Write};
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 
 use foldfront::Mesh;
 use foldfront::mesh_io::{self, Collector, HeightScale, MeshIoError, ReadOptions};
 use png::{BitDepth, ColorType};
 use proptest::prelude::*;
+use reading::{assert_well_formed, counts, read};
 use tempfile::TempDir;
 use tiff::encoder::{TiffEncoder, colortype};
 use tiff::tags::Tag;
-
-/// Reads at once, and piece by piece, which has to come to the same.
-fn read(inputs: &[impl AsRef<Path>]) -> Result<Mesh, MeshIoError> {
-    let whole = mesh_io::read(inputs, &mut |_, _| ());
-    let mut pieces = Collector::default();
-    let folder = std::env::temp_dir();
-    let sent = mesh_io::send(inputs, &ReadOptions::default(), &folder, &mut pieces, &mut |_, _| ());
-    let sent = sent.map(|()| pieces.into_mesh());
-    match (&whole, &sent) {
-        (Ok(whole), Ok(pieces)) => {
-            assert_eq!(whole, pieces);
-            let bits = |mesh: &Mesh| mesh.positions.iter().map(|p| p.map(f32::to_bits)).collect::<Vec<_>>();
-            assert!(bits(whole) == bits(pieces));
-        }
-        // Of several errors, another may be met first.
-        (Err(_), Err(_)) => {}
-        _ => panic!("at once {whole:?}, piece by piece {sent:?}"),
-    }
-    whole
-}
 
 /// Reads `bytes` as a file of this name.
 fn read_bytes(name: &str, bytes: impl AsRef<[u8]>) -> Result<Mesh, MeshIoError> {
@@ -58,10 +40,6 @@ fn error(name: &str, bytes: impl AsRef<[u8]>) -> String {
     let message = read(&[write(&folder, name, bytes)]).unwrap_err().to_string();
     assert!(!message.contains('\n'), "{message}");
     message.replace(&format!("{}/", folder.path().display()), "")
-}
-
-fn counts(mesh: &Mesh) -> (usize, usize) {
-    (mesh.positions.len(), mesh.triangles.len())
 }
 
 /// The area of all triangles, and that of those that turn as the z axis does, less the others, seen along it.
@@ -86,12 +64,6 @@ fn bounds(mesh: &Mesh) -> [f32; 4] {
 fn assert_near(found: &[f32], expected: &[f32], text: &str) {
     let near = found.iter().zip(expected).all(|(f, e)| (f - e).abs() <= 1e-4 * e.abs());
     assert!(near && found.len() == expected.len(), "{text}: {found:?}, not {expected:?}");
-}
-
-fn assert_well_formed(mesh: &Mesh) {
-    assert!(mesh.positions.as_flattened().iter().all(|x| x.is_finite()));
-    assert!(mesh.triangles.as_flattened().iter().all(|&v| (v as usize) < mesh.positions.len()));
-    assert!(!mesh.triangles.is_empty());
 }
 
 /// A square in the plane z = 0, and a triangle standing on its first edge.

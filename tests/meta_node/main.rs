@@ -3,6 +3,8 @@
 #[path = "../common/mod.rs"]
 mod common;
 mod dependencies;
+#[path = "../checks/dependencies.rs"]
+mod needs;
 mod rest;
 
 use std::sync::Arc;
@@ -20,11 +22,8 @@ use foldfront::vertex_tree::source::{Faults, Faulty, MemorySource};
 use foldfront::vertex_tree::{CollapseLog, MeshSink, NullSink, VertexTree};
 use foldfront::view::View;
 use in_memory::{Hierarchy, InMemoryTree};
-use meta_node::{BuildOptions, Dependencies, InUse, MetaNodeFile, MetaNodeTree};
-
-const EXACT: [Strategy; 3] = [Strategy::TopDown, Strategy::Front, Strategy::Event];
-/// Small pages, so that small meshes have many.
-const PAGES: BuildOptions = BuildOptions { levels: Some(3), page_bytes: 700 };
+use meta_node::{Dependencies, InUse, MetaNodeFile, MetaNodeTree};
+use needs::{EXACT, PAGES};
 
 /// A simplified mesh with good triangles.
 fn grid(side: usize) -> CollapseLog {

@@ -7,6 +7,8 @@ mod ahead;
 mod common;
 mod damage;
 mod paging;
+#[path = "../checks/patches.rs"]
+mod patches;
 mod surface;
 mod within;
 
@@ -20,6 +22,7 @@ use foldfront::view::View;
 use foldfront::{CollapseLog, Mesh};
 use glam::DVec3;
 use mt_partition::{CacheMode, Memory, MtFile, MtTree};
+use patches::{advance_settled, all_around, finest};
 
 /// A closed surface of extent about 2: a subdivided octahedron with bumps. Each level has four times the triangles.
 fn bumpy_ball(levels: u32) -> Mesh {
@@ -73,33 +76,6 @@ fn engine<M: MeshSink>(file: &Arc<MtFile>, cache: CacheMode, memory: Memory, mes
     let settings = mt_partition::Settings { cache, memory, ..mt_partition::Settings::default() };
     let tree = MtTree::new(file.clone(), settings).unwrap();
     Engine::new(tree, mesh, Settings { rho: 0.02, ..Settings::default() }).unwrap()
-}
-
-/// Advances until nothing is missing, and says after how many frames that was.
-fn advance_settled<M: MeshSink>(engine: &mut Engine<MtTree, M>, views: &[View]) -> usize {
-    for frame in 0..2000 {
-        if engine.advance(views).unwrap().misses == 0 {
-            return frame;
-        }
-        engine.tree_mut().settle().unwrap();
-    }
-    panic!("the front never arrives");
-}
-
-use foldfront::VertexTree;
-
-/// By the size of spheres and from all around, everything is wanted, whatever its error.
-fn finest<M: MeshSink>(file: &Arc<MtFile>, mesh: M) -> Engine<MtTree, M> {
-    let tree = MtTree::new(file.clone(), mt_partition::Settings::default()).unwrap();
-    let settings = Settings { criterion: Criterion::SphereSize, ..Settings::default() };
-    Engine::new(tree, mesh, settings).unwrap()
-}
-
-/// See [`finest`].
-fn all_around(eye: DVec3) -> [View; 6] {
-    let (cos_beta, sin_beta) = (0.5, 0.75_f64.sqrt());
-    [DVec3::X, DVec3::Y, DVec3::Z, -DVec3::X, -DVec3::Y, -DVec3::Z]
-        .map(|direction| View::from_parts(eye, direction, cos_beta, sin_beta, 1e9).unwrap())
 }
 
 const CRITERION: Criterion = Criterion::ScreenError;

@@ -1,46 +1,16 @@
 //! Every cut covers the surface once, and the finest one is the input.
 
 use std::collections::HashMap;
-use std::sync::Arc;
 
 use foldfront::engine::Engine;
+use foldfront::scene::SceneKind;
 use foldfront::{Mesh, VertexTree};
-use mt_partition::{BuildOptions, CacheMode, Memory, MtFile, MtTree, QueueOrder};
+use mt_partition::{BuildOptions, CacheMode, Memory, MtTree, QueueOrder};
 
 use crate::common::sink::StrictMesh;
-use crate::common::{Random, bumpy_grid, data, graph_cut};
-use crate::{Walk, advance_settled, all_around, ball_log, engine, finest};
-
-/// Triangles by input vertices, each starting with its least one, in ascending order.
-fn canonical(triangles: impl Iterator<Item = [u32; 3]>) -> Vec<[u32; 3]> {
-    let rotated = |t: [u32; 3]| {
-        let least = (0..3).min_by_key(|&i| t[i]).unwrap();
-        [0, 1, 2].map(|i| t[(least + i) % 3])
-    };
-    let mut all: Vec<_> = triangles.map(rotated).collect();
-    all.sort_unstable();
-    all
-}
-
-fn displayed(engine: &Engine<MtTree, StrictMesh>) -> Vec<[u32; 3]> {
-    let vertex = |slot| engine.tree().input_vertex(slot).unwrap();
-    canonical(engine.mesh().triangles.values().map(|t| t.map(vertex)))
-}
-
-fn input(mesh: &Mesh) -> Vec<[u32; 3]> {
-    let is_shown = |t: &[u32; 3]| t[0] != t[1] && t[1] != t[2] && t[2] != t[0];
-    canonical(mesh.triangles.iter().copied().filter(is_shown))
-}
-
-pub fn assert_finest_is_input(file: &Arc<MtFile>, mesh: &Mesh) {
-    let mut engine = finest(file, StrictMesh::default());
-    let (lo, hi) = mesh.bounding_box().unwrap_or_default();
-    let center: [f64; 3] = std::array::from_fn(|i| f64::from(lo[i] + hi[i]) / 2.0);
-    advance_settled(&mut engine, &all_around(center.into()));
-    assert!(displayed(&engine) == input(mesh), "the finest cut is not the input");
-    advance_settled(&mut engine, &[]);
-    assert_eq!(engine.mesh().triangles.len(), file.base_triangles() as usize);
-}
+use crate::common::{Random, bumpy_grid, data, graph_cut, meshes};
+use crate::patches::{assert_finest_is_input, displayed, verifies_and_is_the_input};
+use crate::{Walk, advance_settled, ball_log, engine};
 
 /// How often each directed edge occurs more or less often than its opposite, by edges: the boundary with its sense. It is
 /// the same for all surfaces that cover the same ground, and empty for closed ones.
@@ -130,18 +100,16 @@ fn a_surface_with_a_boundary_has_no_other() {
     assert_finest_is_input(&file, &log.mesh);
 }
 
-/// Every mesh that there is, whatever is wrong with it: the file verifies, the requested patches are reached, and the
-/// finest cut is the input.
 #[test]
-fn real_meshes() {
-    for name in ["bunny", "beast", "ogre", "armadillo_100k"] {
-        let Some(mesh) = data::mesh(&format!("meshes/{name}.ply")) else { return };
-        let log = data::log(mesh);
-        let file = graph_cut::file(&log, &BuildOptions::default());
-        file.verify().unwrap();
-        assert_finest_is_input(&file, &log.mesh);
-        let size = |what: &str| file.facts().iter().find(|f| f.0 == what).unwrap().1.clone();
-        eprintln!("{name}: {}; {}; {}", size("bytes"), size("triangles on arcs"), size("arcs"));
+fn meshes_of_all_kinds() {
+    for (name, mesh) in [
+        ("scan", meshes::scan(14, &mut Random(1))),
+        ("patchwork", meshes::patchwork(12, &mut Random(2))),
+        ("handles", meshes::with_handles(5, 10)),
+        ("mountains with voids", meshes::ground(80, 8, &mut Random(3))),
+        ("town", meshes::part_of(SceneKind::City, 0.3)),
+    ] {
+        verifies_and_is_the_input(name, &data::log(mesh));
     }
 }
 

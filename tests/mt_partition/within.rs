@@ -10,7 +10,8 @@ use mt_partition::{BuildOptions, CacheMode, Memory, MtError, MtFile, Workspace, 
 
 use crate::common::data;
 use crate::common::sink::StrictMesh;
-use crate::surface::{assert_closed, assert_finest_is_input};
+use crate::patches::assert_finest_is_input;
+use crate::surface::assert_closed;
 use crate::{Walk, ball_log, engine};
 
 fn write(

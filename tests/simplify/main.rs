@@ -1,127 +1,57 @@
-//! Hierarchy construction: on real meshes, and on small ones made to be difficult.
+//! Hierarchy construction: on meshes of all kinds, and on small ones made to be difficult. The real ones are in
+//! `tests/real`.
 
 #![expect(clippy::disallowed_methods, reason = "random shapes and motions, or figures to compare with")]
 
 #[path = "../common/mod.rs"]
 mod common;
+#[path = "../checks/hierarchy.rs"]
+mod hierarchy;
 mod out_of_core;
 mod replay;
+#[path = "../checks/within.rs"]
+mod within;
 
-use common::{Random, data};
+use common::{Random, meshes};
+use foldfront::Mesh;
 use foldfront::bvh::Bvh;
-use foldfront::criterion::Criterion;
-use foldfront::cut::{Displayed, uniform_cut};
-use foldfront::simplify::{Options, Report, build};
+use foldfront::cut::Displayed;
+use foldfront::scene::SceneKind;
+use foldfront::simplify::{Options, build};
 use foldfront::vertex_tree::LogError;
-use foldfront::view::{Camera, View, theta_of_pixels};
-use foldfront::{CollapseLog, Mesh};
 use glam::DVec3;
-use replay::Replay;
+use hierarchy::{check, errors_are_honest, is_deterministic, simplify, simplify_and_check};
 
-fn options(merge_components: bool) -> Options {
-    let mut options = Options::default();
-    options.merge_components = merge_components;
-    options
-}
-
-fn simplify(mesh: &Mesh, merge_components: bool) -> (CollapseLog, Report) {
-    build(mesh.clone(), &options(merge_components), &mut |done, all| assert!(done <= all)).unwrap()
-}
-
-/// All that a log promises.
-fn check(mesh: &Mesh, log: &CollapseLog, report: &Report) {
-    assert_eq!(&log.mesh, mesh);
-    let forest = log.forest().unwrap();
-    assert_eq!(report.roots, forest.roots().count());
-    assert_eq!(report.tree_depth, forest.depth());
-    assert!(report.dependency_depth as usize <= report.rounds.len() + report.followers);
-    let replay = Replay::new(log);
-    assert_eq!(report.base_triangles, replay.base_triangles());
-    replay.assert_nested();
-    replay.assert_leaves_contained();
-    let mut has_triangle = vec![false; mesh.positions.len()];
-    mesh.triangles.iter().flatten().for_each(|&v| has_triangle[v as usize] = true);
-    for c in &log.collapses {
-        assert!(has_triangle[c.removed as usize] && has_triangle[c.kept as usize], "{c:?}");
-    }
-
-    // Cuts for cameras near and far, and for a tolerance that is the same everywhere.
-    let mut random = Random(report.collapses as u64);
-    let Some((low, high)) = mesh.bounding_box() else { return };
-    let [low, high] = [low, high].map(|corner| DVec3::from(corner.map(f64::from)));
-    for _ in 0..4 {
-        // A mesh may be a single point, which nothing can look at from there.
-        let extent = if mesh.extent() > 0.0 { mesh.extent() } else { 1.0 };
-        let distance = extent * 10_f64.powf(2.0 * random.unit() - 1.5);
-        let eye = (low + high) * 0.5 + random.direction() * distance;
-        let target = low + (high - low) * DVec3::new(random.unit(), random.unit(), random.unit());
-        let camera = Camera::look_at(eye, target, DVec3::Y, 1.0, 16.0 / 9.0).unwrap();
-        let view = [View::new(&camera, theta_of_pixels(1.0, 1080)).unwrap()];
-        for criterion in [Criterion::ScreenError, Criterion::SphereSize] {
-            let active: Vec<bool> =
-                log.collapses.iter().map(|c| criterion.unfold(&view, &c.bounds)).collect();
-            replay.assert_closed(&active);
-            replay.assert_consistent(&active);
-        }
-    }
-    let mut errors: Vec<f32> = log.collapses.iter().map(|c| c.bounds.eps).collect();
-    errors.sort_by(f32::total_cmp);
-    for part in [4, 2] {
-        if let Some(limit) = errors.get(errors.len() / part) {
-            let active: Vec<bool> = log.collapses.iter().map(|c| c.bounds.eps > *limit).collect();
-            replay.assert_closed(&active);
-            replay.assert_consistent(&active);
-        }
-    }
-}
-
-fn simplify_and_check(mesh: &Mesh, merge_components: bool) -> Report {
-    let (log, report) = simplify(mesh, merge_components);
-    check(mesh, &log, &report);
-    report
-}
-
-macro_rules! real_mesh {
-    ($name:ident, $file:literal, $merge:literal, $($holds:tt)*) => {
+macro_rules! made_up {
+    ($name:ident, $mesh:expr, $merge:literal, $($holds:tt)*) => {
         #[test]
         fn $name() {
-            let Some(mesh) = data::mesh($file) else { return };
-            let report = simplify_and_check(&mesh, $merge);
+            let report = simplify_and_check(&$mesh, $merge);
             assert!(report $($holds)*, "{report:?}");
         }
     };
 }
 
-real_mesh!(armadillo, "meshes/armadillo_100k.ply", false, .base_triangles < 100);
-real_mesh!(beast, "meshes/beast.ply", false, .base_triangles < 1000);
-real_mesh!(bunny, "meshes/bunny.ply", false, .base_triangles < 100);
-real_mesh!(dragon, "meshes/dragon.ply", false, .base_triangles < 5000);
-real_mesh!(happy, "meshes/happy.ply", false, .base_triangles < 5000);
-real_mesh!(horse, "meshes/horse.ply", false, .base_triangles < 100);
-real_mesh!(lucy, "meshes/lucy_100k.ply", false, .base_triangles < 100);
-real_mesh!(ogre, "meshes/ogre.ply", false, .base_triangles < 1000);
-real_mesh!(turbine_blade, "meshes/turbineblade_200k.ply", false, .base_triangles < 100);
-real_mesh!(sierra, "terrain/N36W119.hgt", false, .roots < 10);
-real_mesh!(everest_with_voids, "terrain/N27E086.hgt", false, .base_triangles < 50_000);
-real_mesh!(rainier_with_voids, "terrain/N46W122.hgt", false, .base_triangles < 50_000);
-real_mesh!(death_valley, "terrain/N36W118.hgt", false, .roots < 10);
-real_mesh!(great_basin, "terrain/N37W118.hgt", false, .roots < 10);
-real_mesh!(white_mountains, "terrain/N37W119.hgt", false, .roots < 10);
-real_mesh!(lake_constance, "terrain/N47E009.hgt", false, .roots < 10);
-real_mesh!(mont_blanc, "terrain/alps_montblanc_647_16bit.png", false, .roots < 10);
-real_mesh!(grand_canyon, "terrain/gcanyon_elev_1200_8bit.png", false, .roots < 10);
-real_mesh!(boston, "city/boston_blocks.obj", false, .roots > 1000);
-real_mesh!(den_haag, "city/denhaag01_lod2_terrain.obj", false, .roots > 1000);
-real_mesh!(den_haag_joined, "city/denhaag01_lod2_terrain.obj", true, .roots < 10);
-real_mesh!(boston_joined, "city/boston_blocks.obj", true, .roots < 10);
-real_mesh!(dragon_joined, "meshes/dragon.ply", true, .roots < 10);
+made_up!(closed_surface, meshes::with_handles(3, 16), false, .base_triangles < 100);
+made_up!(closed_surface_of_high_genus, meshes::with_handles(20, 8), false, .base_triangles < 500);
+made_up!(scan, meshes::scan(16, &mut Random(1)), false, .base_triangles < 1000);
+made_up!(scan_joined, meshes::scan(16, &mut Random(1)), true, .roots < 10);
+made_up!(patchwork, meshes::patchwork(14, &mut Random(2)), false, .base_triangles < 1000);
+made_up!(mountains, meshes::ground(150, 0, &mut Random(3)), false, .roots < 10);
+made_up!(mountains_with_voids, meshes::ground(150, 20, &mut Random(3)), false, .base_triangles < 5000);
+made_up!(laserscan, meshes::part_of(SceneKind::Laserscan, 0.25), false, .roots < 10);
+made_up!(town, meshes::part_of(SceneKind::City, 0.5), false, .roots > 500);
+made_up!(town_joined, meshes::part_of(SceneKind::City, 0.5), true, .roots < 10);
 
 #[test]
-fn is_deterministic() {
-    let Some(mesh) = data::mesh("meshes/ogre.ply") else { return };
-    for merge in [false, true] {
-        assert_eq!(simplify(&mesh, merge).0, simplify(&mesh, merge).0);
-    }
+fn the_same_mesh_comes_to_the_same_hierarchy() {
+    is_deterministic(&meshes::patchwork(14, &mut Random(2)));
+}
+
+#[test]
+fn cuts_keep_what_their_errors_promise() {
+    errors_are_honest(&meshes::with_handles(2, 24));
+    errors_are_honest(&meshes::scan(20, &mut Random(4)));
 }
 
 /// A mesh from corner lists, one letter a vertex.
@@ -294,38 +224,6 @@ fn a_filled_bay_is_an_error() {
     check(&mesh, &log, &report);
     let bay = log.collapses.iter().find(|c| c.removed == 1).unwrap();
     assert!(bay.bounds.eps >= 0.4, "{bay:?}");
-}
-
-/// Cuts at one error everywhere keep what they promise, both ways: the input's vertices are as near to what is shown as
-/// the errors of the folded nodes say, up to points that were thinned out; and what is shown is near to the input,
-/// though only edges were looked at in that direction.
-#[test]
-fn errors_are_honest() {
-    let Some(mesh) = data::mesh("meshes/bunny.ply") else { return };
-    let (log, _) = simplify(&mesh, false);
-    let forest = log.forest().unwrap();
-    let input = Bvh::new(&mesh);
-    for part in [1e-4, 1e-3, 1e-2] {
-        let eps = (part * mesh.extent()) as f32;
-        let shown = Displayed::new(&log, &uniform_cut(&log, &forest, eps)).mesh(&mesh);
-        let surface = Bvh::new(&shown);
-        let position = |v: u32| DVec3::from(mesh.positions[v as usize].map(f64::from));
-        let vertices = (0..mesh.positions.len() as u32).map(position);
-        let samples = shown.triangles.iter().flat_map(|corners| {
-            let [a, b, c] = corners.map(position);
-            [(a + b) / 2.0, (b + c) / 2.0, (c + a) / 2.0, (a + b + c) / 3.0]
-        });
-        let distances = |bvh: &Bvh, points: &mut dyn Iterator<Item = DVec3>| {
-            let distance = |p| bvh.nearest(p, f64::INFINITY).unwrap().distance / f64::from(eps);
-            let mut distances: Vec<f64> = points.map(distance).collect();
-            distances.sort_by(f64::total_cmp);
-            (distances[distances.len() * 99 / 100], distances[distances.len() - 1])
-        };
-        let (p99, max) = distances(&surface, &mut vertices.into_iter());
-        assert!(p99 <= 1.0 && max <= 1.5, "input to shown at {part}: {p99} {max}");
-        let (p99, max) = distances(&input, &mut samples.into_iter());
-        assert!(p99 <= 1.0 && max <= 2.5, "shown to input at {part}: {p99} {max}");
-    }
 }
 
 /// Two boxes: each is a component of its own, and together they end in one tree where that is asked for.
