@@ -92,7 +92,7 @@ fn imported(trajectory: &str, mesh: Mesh, mode: Mode, rate: f64, theta: f64) {
 
 #[test]
 fn a_drone_over_an_object() {
-    imported(&trajectories::drone(10), meshes::with_handles(3, 12), Mode::Fly, 60.0, pixels(2.0));
+    imported(&trajectories::drone(20), meshes::with_handles(3, 12), Mode::Fly, 60.0, pixels(2.0));
 }
 
 #[test]
