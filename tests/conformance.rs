@@ -70,7 +70,8 @@ fn a_zoom() {
 
 #[test]
 fn a_budget_tightened_and_loosened() {
-    walks::a_budget_tightened_and_loosened(scan(), 6_000, 300, 15_000);
+    let budgets = [4_000, 1_000, 2_400, 0, 1_200, 6_000];
+    walks::a_budget_tightened_and_loosened(scan(), budgets, 200, 15_000);
 }
 
 #[test]
