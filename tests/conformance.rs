@@ -70,7 +70,8 @@ fn a_zoom() {
 
 #[test]
 fn a_budget_tightened_and_loosened() {
-    walks::a_budget_tightened_and_loosened(scan(), 6_000, 300, 15_000);
+    let budgets = [4_000, 1_000, 2_400, 0, 1_200, 6_000];
+    walks::a_budget_tightened_and_loosened(scan(), budgets, 200, 15_000);
 }
 
 #[test]
@@ -92,7 +93,7 @@ fn imported(trajectory: &str, mesh: Mesh, mode: Mode, rate: f64, theta: f64) {
 
 #[test]
 fn a_drone_over_an_object() {
-    imported(&trajectories::drone(10), meshes::with_handles(3, 12), Mode::Fly, 60.0, pixels(2.0));
+    imported(&trajectories::drone(20), meshes::with_handles(3, 12), Mode::Fly, 60.0, pixels(2.0));
 }
 
 #[test]

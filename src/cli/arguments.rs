@@ -170,7 +170,8 @@ impl Refinement {
 
 #[derive(Debug, Args)]
 pub(super) struct Compare {
-    /// Meshes, hierarchy files and scene:NAME; by default the three built-in scenes. Tiles (.hgt) are one mosaic.
+    /// Meshes, hierarchy files, .scene files (several objects, a file and a matrix a line) and scene:NAME; by default the
+    /// three built-in scenes. Tiles (.hgt) are one mosaic.
     pub input: Vec<String>,
     /// Walkthroughs to replay; by default those recorded for a built-in scene, and a flight around anything else.
     #[arg(long)]

@@ -131,13 +131,12 @@ pub fn a_zoom(log: &CollapseLog, swing_frames: u32, changes: u64) {
     assert!(table.totals.changes > changes, "{:?}", table.totals);
 }
 
-/// The budget is tightened and loosened, and lifted for a while; the camera moves, rests and moves on. `most` triangles
-/// are fewer than are wanted, and each budget is there for so many frames.
-pub fn a_budget_tightened_and_loosened(log: &CollapseLog, most: u64, frames: usize, changes: u64) {
+/// The budget is tightened and loosened, and lifted for a while, where it is 0; the camera moves, rests and moves on. Each
+/// budget is there for so many frames, and fewer triangles than are wanted.
+pub fn a_budget_tightened_and_loosened(log: &CollapseLog, budgets: [u64; 6], frames: usize, changes: u64) {
     let path = around(&log.mesh).unwrap();
     let mut table = Conformance::new(log, settings_for(&path));
-    for (round, thirtieths) in [20, 4, 12, 0, 1, 30].into_iter().enumerate() {
-        let budget = most * thirtieths / 30;
+    for (round, budget) in budgets.into_iter().enumerate() {
         table.set_budget(if budget == 0 { Budget::None } else { Budget::Triangles(budget) });
         table.totals.triangles = None;
         for frame in 0..frames {

@@ -63,7 +63,7 @@ fn poses(comment: &str, samples: &[Sample], body: fn(DVec3, DVec3, DVec3) -> DMa
 
 /// Through a hall, 200 times a second, quick and with turns: x up and z forward.
 pub fn drone(seconds: usize) -> String {
-    let samples = samples(seconds, [200.0, 1.5], &mut Random(31), |_, place, aim| {
+    let samples = samples(seconds, [200.0, 4.0], &mut Random(31), |_, place, aim| {
         [6.0 * place, aim.with_z(0.3 * aim.z)]
     });
     poses("EuRoC MAV, body (IMU) pose", &samples, |right, up, forward| DMat3::from_cols(up, right, forward))

@@ -44,7 +44,8 @@ pub fn trials() -> Vec<Trial> {
         }),
         over_the_bunny("conformance::a_zoom", |log| walks::a_zoom(log, 1000, 20_000)),
         over_the_bunny("conformance::a_budget_tightened_and_loosened", |log| {
-            walks::a_budget_tightened_and_loosened(log, 30_000, 600, 50_000);
+            let budgets = [20_000, 4_000, 12_000, 0, 1_000, 30_000];
+            walks::a_budget_tightened_and_loosened(log, budgets, 600, 50_000);
         }),
         over_the_bunny("conformance::a_budget_in_time", |log| walks::a_budget_in_time(log, 300, 20_000)),
         over_the_bunny("conformance::several_views", |log| {

@@ -122,7 +122,7 @@ fn without_a_quota_to_keep_anything_nothing_is_kept() {
 /// everything is there.
 #[test]
 fn faults_cost_nothing_but_time() {
-    let (bytes, log) = built(14, &options(2, false, false));
+    let (bytes, log) = built(20, &options(2, false, false));
     for (seed, io) in (1..).zip(kinds()) {
         let faults =
             Faults { errors: 60, short: 60, flips: 60, delays: 30, delay: Duration::from_micros(200) };
@@ -134,7 +134,7 @@ fn faults_cost_nothing_but_time() {
         driver.tree.set_quotas(file.resident_bytes_of_all() / 10, u64::MAX);
         let mut random = Random(seed);
         let mut counted = 0;
-        for round in 0..600 {
+        for round in 0..900 {
             driver.tree.begin_frame(&mut Vec::new()).unwrap();
             for _ in 0..8 {
                 let boundary = driver.boundary();
