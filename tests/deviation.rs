@@ -30,7 +30,7 @@ fn a_scan_along_the_hand_held_camera() {
 
 #[test]
 fn mountains_from_all_around() {
-    let mesh = meshes::ground(300, 8, &mut Random(2));
+    let mesh = meshes::ground(220, 8, &mut Random(2));
     let path = around(&mesh).unwrap();
     nominal::nominal_is_measured(mesh, &path, 3);
 }
