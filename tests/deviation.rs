@@ -9,6 +9,7 @@ use std::path::Path as FilePath;
 
 use common::{Random, meshes, trajectories};
 use foldfront::Mesh;
+use foldfront::path::around;
 use foldfront::path::import::{Mode, Options, import_text};
 
 fn nominal_is_measured(mesh: Mesh, trajectory: &str, mode: Mode, frames: usize) {
@@ -28,8 +29,10 @@ fn a_scan_along_the_hand_held_camera() {
 }
 
 #[test]
-fn mountains_along_the_flight() {
-    nominal_is_measured(meshes::ground(300, 0, &mut Random(2)), &trajectories::flight(60), Mode::Fly, 3);
+fn mountains_from_all_around() {
+    let mesh = meshes::ground(220, 8, &mut Random(2));
+    let path = around(&mesh).unwrap();
+    nominal::nominal_is_measured(mesh, &path, 3);
 }
 
 #[test]

@@ -101,7 +101,7 @@ fn optical(right: DVec3, up: DVec3, forward: DVec3) -> DMat3 {
 pub fn flight(seconds: usize) -> String {
     let samples = samples(seconds, [30.0, 8.0], &mut Random(34), |_, place, aim| {
         let middle = DVec3::new(0.5, 0.25, 0.0);
-        let eye = middle + DVec3::new(0.5 * place.x, 0.25 * place.y, 0.06 + 0.03 * place.z);
+        let eye = middle + DVec3::new(0.5 * place.x, 0.25 * place.y, 0.15 + 0.05 * place.z);
         [eye, (middle - eye + 0.2 * aim).with_z(-0.15)]
     });
     let mut text = String::new();

@@ -122,6 +122,7 @@ fn without_a_quota_to_keep_anything_nothing_is_kept() {
 /// everything is there.
 #[test]
 fn faults_cost_nothing_but_time() {
+    // So many blocks that more than 30 reads are befallen, also where a grace keeps what has just been used.
     let (bytes, log) = built(20, &options(2, false, false));
     for (seed, io) in (1..).zip(kinds()) {
         let faults =
