@@ -235,15 +235,8 @@ impl<T: VertexTree, M: MeshSink> Objects<T, M> {
     /// # Errors
     /// The first of an object. The others have been moved all the same.
     pub fn advance(&mut self, views: &[View]) -> Result<FrameReport, ObjectsError> {
-        let mut all = nothing();
-        let mut failure = None;
-        for (number, object) in self.objects.iter_mut().enumerate() {
-            match object.advance(number, views, &mut self.views) {
-                Ok(report) => add(&mut all, &report, number as u64),
-                Err(error) => failure = failure.or(Some(error)),
-            }
-        }
-        failure.map_or(Ok(all), Err)
+        let Self { objects, views: own } = self;
+        together(objects.iter_mut().enumerate().map(|(number, object)| object.advance(number, views, own)))
     }
 
     /// Lets time pass for stores on virtual time.
@@ -268,6 +261,20 @@ impl<T: VertexTree, M: MeshSink> Objects<T, M> {
         };
         self.objects.iter_mut().enumerate().try_for_each(f)
     }
+}
+
+/// The report of all objects, in their order, or the first error. All are looked at in any case.
+fn together(
+    reports: impl Iterator<Item = Result<FrameReport, ObjectsError>>,
+) -> Result<FrameReport, ObjectsError> {
+    let (mut all, mut failure) = (nothing(), None);
+    for (number, report) in (0..).zip(reports) {
+        match report {
+            Ok(report) => add(&mut all, &report, number),
+            Err(error) => failure = failure.or(Some(error)),
+        }
+    }
+    failure.map_or(Ok(all), Err)
 }
 
 /// The report of no object.

@@ -5,7 +5,7 @@ use std::time::Duration;
 use vertex_tree::{MeshSink, TreeError, VertexTree};
 
 use super::stored::{ObjectLine, StoredSceneError};
-use super::{Object, ObjectsError, add, nothing};
+use super::{Object, ObjectsError, together};
 use crate::brute_force::BruteForce;
 use crate::engine::FrameReport;
 use crate::view::View;
@@ -87,21 +87,16 @@ impl StoredObjects {
     /// # Errors
     /// The first of an object. The others have been moved all the same.
     pub fn advance(&mut self, views: &[View]) -> Result<FrameReport, StoredSceneError> {
-        let mut all = nothing();
-        let mut failure = None;
-        for (number, object) in self.objects.iter_mut().enumerate() {
-            match object.advance(number, views, &mut self.views) {
-                Ok(report) => add(&mut all, &report, number as u64),
-                Err(error) => failure = failure.or(Some(error)),
+        let Self { objects, views: own, .. } = self;
+        let reports = objects.iter_mut().enumerate();
+        together(reports.map(|(number, object)| object.advance(number, views, own))).map_err(|error| {
+            match error {
+                ObjectsError::Tree { object, source } => self.tree_error(object, source),
+                ObjectsError::View { object, source } => {
+                    StoredSceneError::View { at: Box::new(self.lines[object].clone()), source }
+                }
             }
-        }
-        match failure {
-            None => Ok(all),
-            Some(ObjectsError::Tree { object, source }) => Err(self.tree_error(object, source)),
-            Some(ObjectsError::View { object, source }) => {
-                Err(StoredSceneError::View { at: Box::new(self.lines[object].clone()), source })
-            }
-        }
+        })
     }
 
     /// Lets time pass for stores on virtual time.
