@@ -20,7 +20,8 @@
 //!
 //! The paper's navigation reads the nodes of the front in every frame, so that their pages must stay. Ours does not: the
 //! engine keeps sphere and error of the front itself, and a page is touched only by a change. So with
-//! [`InUse::Yields`], the default and what `--prefetch paper` means, what has been prefetched and not touched yet makes room first, then what has not been
+//! [`InUse::Yields`], the default and what `--prefetch paper` means, what has been prefetched and not touched yet makes room
+//! first, then what has not been
 //! touched for longest, whatever its counts, for switching down too; and every cut can be reached with any number of
 //! place holders from four on. With [`InUse::Stays`] free
 //! places go first, then those of pages that are only referred to, the three-free rule holds as printed, and a front that
