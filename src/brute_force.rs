@@ -77,11 +77,22 @@ impl BruteForce {
         differs.iter().filter(|&&differs| differs).count() as u64
     }
 
+    /// [`wrong`](Self::wrong), and how many of these no change explains that was refused in the frame.
+    pub fn judge<T: VertexTree, M: MeshSink>(
+        &mut self,
+        engine: &Engine<T, M>,
+        has_dependencies: bool,
+    ) -> [u64; 2] {
+        let wrong = self.wrong(engine);
+        let is_all = engine.missing().is_empty();
+        [wrong, if is_all { wrong } else { self.unexplained(engine, has_dependencies) }]
+    }
+
     /// Like [`wrong`](Self::wrong), for a frame in which changes were refused: those only that this does not explain. A node
     /// that was not unfolded keeps folded what is below it, and one that was not folded keeps active what is above it.
     /// Where the backend has dependencies beyond structure, a boundary node may have waited for another one: then nodes
     /// that are wrongly folded are explained by any refusal.
-    pub fn unexplained<T: VertexTree, M: MeshSink>(
+    fn unexplained<T: VertexTree, M: MeshSink>(
         &mut self,
         engine: &Engine<T, M>,
         has_dependencies: bool,

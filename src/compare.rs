@@ -29,7 +29,7 @@ use std::sync::Arc;
 
 use detail_block::XfmTree;
 use in_memory::{Hierarchy, InMemoryTree};
-use meta_node::{Dependencies, MetaNodeTree};
+use meta_node::MetaNodeTree;
 use mt_partition::MtTree;
 use vertex_tree::{CollapseLog, Mesh, NullSink, TreeError, VertexTree};
 
@@ -165,15 +165,6 @@ impl Subject {
     #[must_use]
     pub fn backend(&self) -> Backend {
         self.store.backend()
-    }
-
-    /// Whether a node may wait for one that is neither above nor below it.
-    fn has_dependencies(&self, paging: &Paging) -> bool {
-        match self.backend() {
-            Backend::InMemory | Backend::MtPartition => false,
-            Backend::MetaNode => paging.dependencies != Dependencies::Off,
-            Backend::DetailBlock => true,
-        }
     }
 
     fn store_error(&self, source: StoreError) -> CompareError {

@@ -33,13 +33,13 @@ impl<T: VertexTree> Settled<T> {
     /// A backend that waits.
     #[must_use]
     pub fn new(tree: T) -> Self {
-        Self { tree, waits: true, refused: Vec::new(), stalled: Duration::ZERO }
+        Self::waiting(tree, true)
     }
 
-    /// A backend that does not, and is as it would be without this: so that what replays a path need not care.
+    /// A backend that waits or, if it does not, is as it would be without this: so that what replays a path need not care.
     #[must_use]
-    pub fn in_real_time(tree: T) -> Self {
-        Self { waits: false, ..Self::new(tree) }
+    pub fn waiting(tree: T, waits: bool) -> Self {
+        Self { tree, waits, refused: Vec::new(), stalled: Duration::ZERO }
     }
 
     fn insist(

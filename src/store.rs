@@ -6,7 +6,7 @@ use std::sync::atomic::AtomicBool;
 
 use detail_block::{XfmError, XfmFile};
 use in_memory::Hierarchy;
-use meta_node::{MetaNodeError, MetaNodeFile};
+use meta_node::{Dependencies, MetaNodeError, MetaNodeFile};
 use mt_partition::{MtError, MtFile};
 use vertex_tree::source::{FileSource, PageSource};
 use vertex_tree::{
@@ -39,6 +39,16 @@ impl Backend {
             Self::MetaNode => "meta-node",
             Self::DetailBlock => "detail-block",
             Self::MtPartition => "mt-partition",
+        }
+    }
+
+    /// Whether a node may wait for one that is neither above nor below it, where meta-nodes have this rule.
+    #[must_use]
+    pub fn has_dependencies(self, of_meta_nodes: Dependencies) -> bool {
+        match self {
+            Self::InMemory | Self::MtPartition => false,
+            Self::MetaNode => of_meta_nodes != Dependencies::Off,
+            Self::DetailBlock => true,
         }
     }
 

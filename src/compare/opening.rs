@@ -71,6 +71,6 @@ impl Opening {
     }
 
     pub fn wrap<T: VertexTree>(&self, tree: T) -> Settled<T> {
-        if self.waits() { Settled::new(tree) } else { Settled::in_real_time(tree) }
+        Settled::waiting(tree, self.waits())
     }
 }

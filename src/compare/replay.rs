@@ -127,15 +127,11 @@ impl Replay<'_> {
                     difference.map_or(0, |d| d.count as u64)
                 }
                 Check::Nodes(brute_force) => {
-                    let wrong = brute_force.wrong(engine);
-                    let has_dependencies = self.subject.has_dependencies(&self.opening.paging);
-                    let unexplained = match report.misses {
-                        0 => wrong,
-                        _ => brute_force.unexplained(engine, has_dependencies),
-                    };
+                    let backend = self.subject.backend();
+                    let has_dependencies = backend.has_dependencies(self.opening.paging.dependencies);
+                    let [wrong, unexplained] = brute_force.judge(engine, has_dependencies);
                     if unexplained > 0 && is_exact {
-                        let (strategy, backend) =
-                            (self.settings.strategy.name(), self.subject.backend().name());
+                        let (strategy, backend) = (self.settings.strategy.name(), backend.name());
                         let wrong = unexplained;
                         return Err(CompareError::Differs { scene, path, frame, strategy, backend, wrong });
                     }

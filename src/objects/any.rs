@@ -47,12 +47,7 @@ impl<T: VertexTree, M: MeshSink> AnyObject for (Object<T, M>, bool) {
     }
 
     fn wrong(&self, brute_force: &mut BruteForce) -> [u64; 2] {
-        let wrong = brute_force.wrong(&self.0.engine);
-        let unexplained = match self.0.engine.missing().is_empty() {
-            true => wrong,
-            false => brute_force.unexplained(&self.0.engine, self.1),
-        };
-        [wrong, unexplained]
+        brute_force.judge(&self.0.engine, self.1)
     }
 
     fn brute_force(&mut self, at: &ObjectLine) -> Result<BruteForce, StoredSceneError> {

@@ -16,7 +16,7 @@ use std::time::Duration;
 
 use detail_block::XfmTree;
 use in_memory::InMemoryTree;
-use meta_node::{Dependencies, MetaNodeTree};
+use meta_node::MetaNodeTree;
 use mt_partition::{Memory, MtTree, Reader};
 use rustc_hash::FxHashMap;
 use vertex_tree::{LogError, NullSink, TreeError, VertexTree};
@@ -262,23 +262,23 @@ impl StoredScene {
     ) -> Result<Box<dyn AnyObject>, StoredSceneError> {
         let at = &object.at;
         let wrap = |source| StoredSceneError::File { at: Box::new(at.clone()), source };
-        let (placement, waits) = (object.placement, paging.waits);
-        match &self.files[object.file] {
+        let store = &self.files[object.file];
+        let depends = store.backend().has_dependencies(paging.meta_node.dependencies);
+        match store {
             Store::InMemory(hierarchy, _) => {
-                place(InMemoryTree::new(hierarchy.clone()), at, placement, settings, waits, false)
+                place(InMemoryTree::new(hierarchy.clone()), object, settings, paging.waits, depends)
             }
             Store::MetaNode(file) => {
-                let depends = paging.meta_node.dependencies != Dependencies::Off;
                 let tree = MetaNodeTree::new(file.clone(), paging.meta_node).map_err(|e| wrap(e.into()))?;
-                place(tree, at, placement, settings, waits, depends)
+                place(tree, object, settings, paging.waits, depends)
             }
             Store::DetailBlock(file) => {
                 let tree = XfmTree::new(file.clone(), paging.detail_block).map_err(|e| wrap(e.into()))?;
-                place(tree, at, placement, settings, waits, true)
+                place(tree, object, settings, paging.waits, depends)
             }
             Store::MtPartition(file) => {
                 let tree = MtTree::new(file.clone(), paging.mt_partition.clone());
-                place(tree.map_err(|e| wrap(e.into()))?, at, placement, settings, waits, false)
+                place(tree.map_err(|e| wrap(e.into()))?, object, settings, paging.waits, depends)
             }
         }
     }
@@ -344,16 +344,15 @@ impl StoredScene {
 /// An engine over a tree, at its place in the scene.
 fn place<T: VertexTree + 'static>(
     tree: T,
-    at: &ObjectLine,
-    placement: Placement,
+    object: &StoredObject,
     settings: Settings,
     waits: bool,
     depends: bool,
 ) -> Result<Box<dyn AnyObject>, StoredSceneError> {
-    let tree = if waits { Settled::new(tree) } else { Settled::in_real_time(tree) };
-    let object = Object::new(tree, NullSink, placement, settings);
-    let object = object.map_err(|source| StoredSceneError::Tree { at: Box::new(at.clone()), source })?;
-    Ok(Box::new((object, depends)))
+    let StoredObject { at, placement, .. } = object;
+    let placed = Object::new(Settled::waiting(tree, waits), NullSink, *placement, settings);
+    let placed = placed.map_err(|source| StoredSceneError::Tree { at: Box::new(at.clone()), source })?;
+    Ok(Box::new((placed, depends)))
 }
 
 /// Opens the file of an object.
