@@ -29,23 +29,19 @@
 //! Let `w = 2^-53`. Every component of `D` is the rounded difference of two numbers that are exact, so `D` is good to
 //! `w d`, and `v` is of length 1 to within `45w`. With that `d^2` is good to `5w d^2`; `a` to `50w d`; a component of
 //! `D x v` loses `w` of each of its two products and of their difference, all three together no more than `3w d`, and
-//! `p` is good to `50w d` however near the axis the centre is. `d^2 - a^2` takes half as many operations, and is good to
-//! `106w d^2`, so its root is to `106w d^2 / 2p`: for `p > d / 16`, to `850w d`. Nearer the axis that is rounding and nothing
-//! else, up to `1e-8 d`, but there it makes no difference in most views: with `tan beta` between 1/8 and 8, where `p <= d / 16`,
-//! `p cos beta` is less than 0.51 of `|a| sin beta`, and `p sin beta` than 0.51 of `|a| cos beta`, in either way of finding `p`.
-//! Ahead of the eye such a centre is in the cone, behind it the apex is nearest, by far. So the predicate takes the difference
-//! in these views, and the cross product in all others. `b = r + a sin beta` is good to `55w (d + r)`; squares and products with
-//! squares of sine and cosine lose `5w` of what they are. So the predicate decides as an exact one would on lengths that
-//! differ from these by less than `930w (d + r)`, or `128w (d + R)` for coarseness: about `1e-13` of them. `q = a cos beta +
+//! `p` is good to `50w d` however near the axis the centre is. (`sqrt(d^2 - a^2)` is not: there the difference is
+//! rounding, and its root `1e-8 d`.) `b = r + a sin beta` is good to `55w (d + r)`; squares and products with squares of
+//! sine and cosine lose `5w` of what they are. So the predicate decides as an exact one would on lengths that differ
+//! from these by less than `128w (d + r)`, or `128w (d + R)` for coarseness: about `1.5e-14` of them. `q = a cos beta +
 //! p sin beta`, which says whether the apex is nearest, is as good, and where it is 0 both formulas for `f` give `d`, to
 //! within `q^2 / d`. Below `1e-150` squares are lost, and with them lengths.
 //!
-//! The time bounds give up `SLACK (d + r)` or `SLACK (d + R)` and `1e-150`, which is 8,000 times what predicate and
-//! bound lose together (the bound takes the cross product everywhere): neither is late by rounding.
+//! The time bounds give up `SLACK (d + r)` or `SLACK (d + R)` and `1e-150`, which is 60,000 times what predicate and
+//! bound lose together: neither is late by rounding.
 //!
 //! Nesting is what rounding might break: a child may be found to be in view that sticks out of its parent by less than
-//! that. Construction leaves `2^-20 r` between the spheres of parents and children, so for `d + R` up to `4 * 10^6 r` it
-//! can not.
+//! that. Construction leaves `2^-20 r` between the spheres of parents and children, so for `d + R` up to `10^7 r`
+//! and more it can not.
 //!
 //! A [`View`] is finite, with `k` of at least 1, and so are [bounds](Bounds::is_sane): `R` is a number, at least `r`. It
 //! may be infinite, and its square too, with which nothing is done but to compare. All else is finite, as squares of
@@ -142,7 +138,7 @@ impl Criterion {
         }
         let v = view.direction();
         let a = dx * v.x + dy * v.y + dz * v.z;
-        let p2 = if view.is_ordinary() { d2 - a * a } else { squared_cross([dx, dy, dz], v) };
+        let p2 = squared_cross([dx, dy, dz], v);
         let (sin, cos) = (view.sin_beta(), view.cos_beta());
         let behind_apex = a < 0.0 && p2 * (sin * sin) < a * a * (cos * cos);
         if behind_apex {
@@ -177,11 +173,7 @@ impl Criterion {
         let (reach2, r2) = (both(&|i| reach[i] * reach[i]), both(&|i| r[i] * r[i]));
         let a = both(&|i| dx[i] * v.x + dy[i] * v.y + dz[i] * v.z);
         let a2 = both(&|i| a[i] * a[i]);
-        let p2 = if view.is_ordinary() {
-            both(&|i| d2[i] - a2[i])
-        } else {
-            both(&|i| squared_cross([dx[i], dy[i], dz[i]], v))
-        };
+        let p2 = both(&|i| squared_cross([dx[i], dy[i], dz[i]], v));
         let (sin, cos) = (view.sin_beta(), view.cos_beta());
         let (sin2, cos2) = (sin * sin, cos * cos);
         let bound = both(&|i| r[i] + a[i] * sin);

@@ -39,13 +39,6 @@ pub struct View {
     cos_beta: f64,
     sin_beta: f64,
     k: f64,
-    is_ordinary: bool,
-}
-
-/// Whether a half-angle is from 7.2 to 82.8 degrees, with tangents from 1/8 to 8. Then it makes no difference how far from the
-/// axis a centre is whose direction is within a sixteenth of it: see [`criterion`](crate::criterion).
-fn is_ordinary(cos_beta: f64, sin_beta: f64) -> bool {
-    8.0 * sin_beta >= cos_beta && sin_beta <= 8.0 * cos_beta
 }
 
 impl View {
@@ -96,8 +89,7 @@ impl View {
         k: f64,
     ) -> Result<Self, ViewError> {
         check_cone(cos_beta, sin_beta)?;
-        let (eye, direction, k) = (check_eye(eye)?, unit(direction)?, check_k(k)?);
-        Ok(Self { eye, direction, cos_beta, sin_beta, k, is_ordinary: is_ordinary(cos_beta, sin_beta) })
+        Ok(Self { eye: check_eye(eye)?, direction: unit(direction)?, cos_beta, sin_beta, k: check_k(k)? })
     }
 
     /// Eye position: in world coordinates for an engine, in those of the spheres for the criterion.
@@ -126,12 +118,6 @@ impl View {
     #[must_use]
     pub fn sin_beta(&self) -> f64 {
         self.sin_beta
-    }
-
-    /// Whether the cone is neither narrow nor wide: see [`is_ordinary`].
-    #[inline(always)]
-    pub(crate) fn is_ordinary(&self) -> bool {
-        self.is_ordinary
     }
 
     /// `1 / (tan(fov_y / 2) theta)`, at least 1 and finite: how many times its own size away a length may be before it
@@ -164,7 +150,7 @@ impl View {
     /// [`ViewError::Cone`].
     pub fn with_cone(self, cos_beta: f64, sin_beta: f64) -> Result<Self, ViewError> {
         check_cone(cos_beta, sin_beta)?;
-        Ok(Self { cos_beta, sin_beta, is_ordinary: is_ordinary(cos_beta, sin_beta), ..self })
+        Ok(Self { cos_beta, sin_beta, ..self })
     }
 
     /// The same view with another [`k`](Self::k).
@@ -217,6 +203,6 @@ impl View {
     /// What no constructor makes, to see what comes of it.
     #[cfg(test)]
     pub(crate) fn unchecked(eye: DVec3, direction: DVec3, cos_beta: f64, sin_beta: f64, k: f64) -> Self {
-        Self { eye, direction, cos_beta, sin_beta, k, is_ordinary: is_ordinary(cos_beta, sin_beta) }
+        Self { eye, direction, cos_beta, sin_beta, k }
     }
 }

@@ -4,10 +4,10 @@ use rand_pcg::Pcg64Mcg;
 
 use super::*;
 
-/// In any view, and however near its axis, the predicate says what lengths found by the cross product say, but within a
+/// In any view, and however near its axis, the predicate says what the lengths say that its bounds go by, but within a
 /// trillionth of a mark.
 #[test]
-fn either_way_of_finding_the_distance_from_the_axis_decides_alike() {
+fn squares_and_lengths_decide_alike() {
     let mut random = Pcg64Mcg::seed_from_u64(17);
     let mut seen = [0; 2];
     for trial in 0..300_000 {
@@ -18,8 +18,6 @@ fn either_way_of_finding_the_distance_from_the_axis_decides_alike() {
         let (cos, sin) = (1.0 / (1.0 + tan * tan).sqrt(), tan / (1.0 + tan * tan).sqrt());
         let eye = DVec3::new(unit(), unit(), unit()) * [0.0, 1.0, 1e3][trial / 7 % 3];
         let view = View::from_parts(eye, direction, cos, sin, 1e9).unwrap();
-        assert_eq!(view.is_ordinary(), (0.125..=8.0).contains(&tan));
-        assert_eq!(View::from_parts(eye, direction, 0.6, 0.8, 1e9).unwrap().with_cone(cos, sin), Ok(view));
         // At the axis, about a sixteenth off it, at the cone's edge, anywhere.
         let off = [1e-9, 1e-3, 0.0625, tan, 2.0 * unit().abs()][trial / 21 % 5] * (1.0 + 1e-6 * unit());
         let ahead = unit();
