@@ -161,7 +161,7 @@ fn all_backends(log: &CollapseLog, path: &Path, folder: &FilePath) -> Vec<Figure
             .replay(path, 0..path.frames.len(), &options, &mut |_, _| ())
             .expect("every frame is that of brute force");
         let counted: Vec<f64> =
-            runs[0].rows.iter().step_by(COUNT_EVERY).map(|row| row.report.triangles as f64).collect();
+            runs[0].rows.iter().step_by(COUNT_EVERY).map(|row| row.report.displayed as f64).collect();
         let (mut p99, mut largest) = (0.0_f64, 0.0_f64);
         for n in 0..MEASURED {
             let frame = (2 * n + 1) * path.frames.len() / (2 * MEASURED);

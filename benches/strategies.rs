@@ -23,7 +23,7 @@ use foldfront::vertex_tree::{MeshSink, NullSink, read_log, write_log};
 use foldfront::view::{View, theta_of_pixels};
 use foldfront::{CollapseLog, Mesh, mesh_io, simplify};
 use glam::{DMat3, DQuat, DVec3};
-use in_memory::{Hierarchy, InMemoryTree};
+use in_memory::{InMemoryHierarchy, InMemoryTree};
 
 const EXACT: [Strategy; 3] = [Strategy::TopDown, Strategy::Front, Strategy::Event];
 /// Each replay is made this often, strategies in turn. Of each frame the least times count: what else the machine does
@@ -106,8 +106,8 @@ fn cached(name: &str, build: &simplify::Options, mesh: impl FnOnce() -> Mesh) ->
     })
 }
 
-fn arrange(log: &CollapseLog) -> Arc<Hierarchy> {
-    Arc::new(Hierarchy::new(log).expect("the log was just built"))
+fn arrange(log: &CollapseLog) -> Arc<InMemoryHierarchy> {
+    Arc::new(InMemoryHierarchy::new(log).expect("the log was just built"))
 }
 
 /// The triangles of a mesh that lie south-west of the origin.
@@ -193,7 +193,7 @@ fn rest(walk: &Path) -> Path {
 
 /// Replays a path from the base mesh on and leaves the first frame out: it unfolds the whole cut.
 fn replay<M: MeshSink>(
-    hierarchy: &Arc<Hierarchy>,
+    hierarchy: &Arc<InMemoryHierarchy>,
     settings: Settings,
     views: &[View],
     sink: impl FnOnce(&InMemoryTree) -> M,
@@ -205,7 +205,7 @@ fn replay<M: MeshSink>(
     let mut reports = Vec::with_capacity(views.len());
     for view in views {
         reports.push(engine.advance(std::slice::from_ref(view)).expect("nothing can fail in memory"));
-        clear(engine.mesh_mut());
+        clear(engine.sink_mut());
     }
     reports.remove(0);
     reports
@@ -250,7 +250,7 @@ impl Figures {
 }
 
 /// Replays `walk` with every strategy and prints a table; `[mesh kept, null sink]` for each strategy.
-fn table(hierarchy: &Arc<Hierarchy>, walk: &Path, declared: &Path, pixels: f64) -> Vec<[Figures; 2]> {
+fn table(hierarchy: &Arc<InMemoryHierarchy>, walk: &Path, declared: &Path, pixels: f64) -> Vec<[Figures; 2]> {
     let theta = theta_of_pixels(pixels, 1080);
     let views: Vec<View> =
         (0..walk.frames.len()).map(|frame| walk.view(frame, theta).expect("a view")).collect();
@@ -311,7 +311,7 @@ fn table(hierarchy: &Arc<Hierarchy>, walk: &Path, declared: &Path, pixels: f64) 
 }
 
 /// A calm path at full speed, at a tenth of it and at rest.
-fn calm_tables(hierarchy: &Arc<Hierarchy>, walk: &Path, pixels: f64) {
+fn calm_tables(hierarchy: &Arc<InMemoryHierarchy>, walk: &Path, pixels: f64) {
     println!("{} at {pixels} pixels, full speed", walk.name);
     table(hierarchy, walk, walk, pixels);
     println!("{} at {pixels} pixels, a tenth of full speed", walk.name);
@@ -321,7 +321,7 @@ fn calm_tables(hierarchy: &Arc<Hierarchy>, walk: &Path, pixels: f64) {
 }
 
 /// A path with stops, slow pans, spins and a teleport.
-fn wild_table(hierarchy: &Arc<Hierarchy>, walk: &Path) {
+fn wild_table(hierarchy: &Arc<InMemoryHierarchy>, walk: &Path) {
     println!("{}", walk.name);
     table(hierarchy, walk, walk, 1.0);
 }

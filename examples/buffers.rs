@@ -11,7 +11,7 @@ use std::sync::Arc;
 use foldfront::active_mesh::ActiveMesh;
 use foldfront::engine::{Engine, Settings};
 use foldfront::glam::DVec3;
-use foldfront::in_memory::{Hierarchy, InMemoryTree};
+use foldfront::in_memory::{InMemoryHierarchy, InMemoryTree};
 use foldfront::scene::Scene;
 use foldfront::simplify;
 use foldfront::view::{Camera, View, theta_of_pixels};
@@ -95,7 +95,7 @@ pub fn main() -> Result<(), Box<dyn std::error::Error>> {
     let mut options = simplify::Options::default();
     options.merge_components = true;
     let (log, _) = simplify::build(mesh, &options, &mut |_, _| ())?;
-    let tree = InMemoryTree::new(Arc::new(Hierarchy::new(&log)?));
+    let tree = InMemoryTree::new(Arc::new(InMemoryHierarchy::new(&log)?));
     let settings = Settings { rho: 5.0, omega: 0.02, ..Settings::default() };
     let mut engine = Engine::new(tree, ActiveMesh::new(), settings)?;
     let mut drawable = Drawable::default();
@@ -105,8 +105,8 @@ pub fn main() -> Result<(), Box<dyn std::error::Error>> {
         let camera = Camera::look_at(eye, DVec3::new(0.0, 0.0, 20.0), DVec3::Z, 1.0, 16.0 / 9.0)?;
         engine.advance(&[View::new(&camera, theta_of_pixels(1.0, 1080))?])?;
         let before = drawable.vertices.uploaded + drawable.indices.uploaded;
-        drawable.patch(engine.mesh_mut());
-        let mesh = engine.mesh();
+        drawable.patch(engine.sink_mut());
+        let mesh = engine.sink();
         assert!(drawable.drawn(mesh.triangles().len()) == displayed(mesh), "frame {frame}: another mesh");
         if frame > 0 {
             patched += drawable.vertices.uploaded + drawable.indices.uploaded - before;

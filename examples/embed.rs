@@ -7,7 +7,7 @@ use std::sync::Arc;
 use foldfront::active_mesh::ActiveMesh;
 use foldfront::engine::{Engine, Settings};
 use foldfront::glam::DVec3;
-use foldfront::in_memory::{Hierarchy, InMemoryTree};
+use foldfront::in_memory::{InMemoryHierarchy, InMemoryTree};
 use foldfront::scene::Scene;
 use foldfront::simplify;
 use foldfront::view::{Camera, View, theta_of_pixels};
@@ -17,7 +17,7 @@ pub fn main() -> Result<(), Box<dyn std::error::Error>> {
     // `foldfront::mesh_io::read` reads files.
     let mesh = Scene::parse("scene:city")?.mesh(&mut |_, _| ());
     let (log, _) = simplify::build(mesh, &simplify::Options::default(), &mut |_, _| ())?;
-    let tree = InMemoryTree::new(Arc::new(Hierarchy::new(&log)?));
+    let tree = InMemoryTree::new(Arc::new(InMemoryHierarchy::new(&log)?));
     let settings = Settings { rho: 1.0, omega: 0.02, ..Settings::default() };
     let mut engine = Engine::new(tree, ActiveMesh::new(), settings)?;
     for frame in 0..240 {
@@ -25,9 +25,9 @@ pub fn main() -> Result<(), Box<dyn std::error::Error>> {
         let camera = Camera::look_at(eye, DVec3::new(0.0, 0.0, 20.0), DVec3::Z, 1.0, 16.0 / 9.0)?;
         let report = engine.advance(&[View::new(&camera, theta_of_pixels(1.0, 1080))?])?;
         if frame % 60 == 0 {
-            println!("frame {frame}: {} triangles, {:?}", report.triangles, report.select);
+            println!("frame {frame}: {} triangles, {:?}", report.displayed, report.select);
         }
-        engine.mesh_mut().clear_changes(); // after drawing: see the example `buffers`
+        engine.sink_mut().clear_changes(); // after drawing: see the example `buffers`
     }
     Ok(())
 }

@@ -24,7 +24,9 @@ use foldfront::view::{Camera, View, theta_of_pixels};
 mod disc {
     use std::collections::HashMap;
 
-    use vertex_tree::{Bounds, MeshSink, NodeId, Step, TreeError, TriangleId, VertexId, VertexTree};
+    use vertex_tree::{
+        Bounds, Hierarchy, MeshSink, NodeId, Step, TreeError, TriangleId, VertexId, VertexTree,
+    };
 
     /// Arcs of the base mesh, and how often each can be halved.
     const ROOTS: u32 = 4;
@@ -84,13 +86,13 @@ mod disc {
         }
     }
 
-    impl VertexTree for Disc {
+    impl Hierarchy for Disc {
         const IS_TREE: bool = true;
 
         fn node_limit(&self) -> u32 {
             ROOTS * HEAP
         }
-        fn displayed_triangles(&self) -> u64 {
+        fn displayed(&self) -> u64 {
             self.shown.len() as u64
         }
         fn roots(&self) -> &[NodeId] {
@@ -116,7 +118,9 @@ mod disc {
         fn log_number(&self, node: NodeId) -> u32 {
             node.0
         }
+    }
 
+    impl VertexTree for Disc {
         fn base_mesh<M: MeshSink>(&mut self, mesh: &mut M) -> Result<(), TreeError> {
             let middle = self.slot(0);
             assert_eq!(middle, MIDDLE);
@@ -172,16 +176,16 @@ pub fn main() -> Result<(), Box<dyn std::error::Error>> {
         let rim = DVec3::new(angle.cos(), angle.sin(), 0.0);
         let camera = Camera::look_at(rim * (1.0 + height) + DVec3::Z * height, rim, DVec3::Z, 1.0, 1.5)?;
         let report = engine.advance(&[View::new(&camera, theta_of_pixels(0.5, 1080))?])?;
-        engine.mesh_mut().clear_changes();
-        assert_eq!(report.triangles, engine.mesh().displayed() as u64);
+        engine.sink_mut().clear_changes();
+        assert_eq!(report.displayed, engine.sink().displayed() as u64);
         // Every triangle has its share of the disc: together they have the area of the polygon.
-        let mesh = engine.mesh();
+        let mesh = engine.sink();
         let at = |v: u32| DVec3::from(mesh.positions()[v as usize].map(f64::from));
         let area = |[a, b, c]: [u32; 3]| 0.5 * (at(b) - at(a)).cross(at(c) - at(a)).z;
         let area: f64 = mesh.displayed_triangles().map(|(_, corners)| area(corners)).sum();
         assert!(area > 1.99 && area < std::f64::consts::PI, "frame {frame}: {area}");
         if frame % 100 == 99 {
-            println!("{height:.6} above the rim: {} triangles, {area:.6} of pi", report.triangles);
+            println!("{height:.6} above the rim: {} triangles, {area:.6} of pi", report.displayed);
         }
     }
     Ok(())

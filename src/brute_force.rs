@@ -7,7 +7,7 @@
 use std::collections::VecDeque;
 use std::ops::ControlFlow;
 
-use vertex_tree::{Bounds, MeshSink, NodeId, NormalCone, NullSink, Step, TreeError, VertexTree};
+use vertex_tree::{Bounds, Hierarchy, NodeId, NormalCone, NullSink, Refine, Step, TreeError};
 
 use crate::engine::{Engine, Settings};
 use crate::front::mix;
@@ -21,6 +21,19 @@ pub struct BruteForce {
     /// Of each node by number, its place among the nodes.
     places: Vec<u32>,
     active: Vec<bool>,
+    /// What is displayed with every node folded.
+    at_first: u64,
+}
+
+/// A cut by brute force.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Cut {
+    /// Comparable with [`Front::cut_hash`](crate::front::Front::cut_hash).
+    pub hash: u64,
+    /// How many nodes are active.
+    pub nodes: u64,
+    /// What is displayed, see [`Hierarchy::displayed`].
+    pub displayed: u64,
 }
 
 #[derive(Clone, Debug)]
@@ -29,24 +42,28 @@ struct Node {
     cone: NormalCone,
     log_number: u32,
     parents: Vec<u32>,
+    /// By how much its unfolding changes what is displayed.
+    displays: i64,
 }
 
 impl BruteForce {
-    /// Unfolds all of a tree that is wholly folded, and has memory for everything.
+    /// Unfolds all of a tree that has been [started](Refine::start), is wholly folded, and has memory for everything.
     ///
     /// # Errors
     /// What the backend reports.
-    pub fn new<T: VertexTree>(tree: &mut T) -> Result<Self, TreeError> {
-        let mut all = Self::default();
+    pub fn new<T: Refine<NullSink>>(tree: &mut T) -> Result<Self, TreeError> {
+        let mut all = Self { at_first: tree.displayed(), ..Self::default() };
+        let mut displayed = all.at_first;
         unfold_all(tree, &mut NullSink, |tree, node| {
-            all.add(tree, node);
+            let before = std::mem::replace(&mut displayed, tree.displayed());
+            all.add(tree, node, displayed.wrapping_sub(before) as i64);
             ControlFlow::Continue(())
         })?;
         all.active = vec![false; all.nodes.len()];
         Ok(all)
     }
 
-    fn add<T: VertexTree>(&mut self, tree: &T, node: NodeId) {
+    fn add<T: Hierarchy>(&mut self, tree: &T, node: NodeId, displays: i64) {
         if self.places.len() <= node.index() {
             self.places.resize(node.index() + 1, u32::MAX);
         }
@@ -60,13 +77,14 @@ impl BruteForce {
             },
             log_number: tree.log_number(node),
             parents: tree.parents(node).map(|parent| self.places[parent.index()]).collect(),
+            displays,
         });
     }
 
     /// How many nodes of an engine's front have not the status that brute force gives them for the engine's own views.
-    pub fn wrong<T: VertexTree, M: MeshSink>(&mut self, engine: &Engine<T, M>) -> u64 {
-        let (hash, count) = self.cut(engine.settings(), engine.views());
-        if (hash, count) == (engine.front().cut_hash(), engine.front().active_nodes()) {
+    pub fn wrong<T: Refine<S>, S>(&mut self, engine: &Engine<T, S>) -> u64 {
+        let Cut { hash, nodes, .. } = self.cut(engine.settings(), engine.views());
+        if (hash, nodes) == (engine.front().cut_hash(), engine.front().active_nodes() as u64) {
             return 0;
         }
         let mut differs = self.active.clone();
@@ -78,11 +96,7 @@ impl BruteForce {
     }
 
     /// [`wrong`](Self::wrong), and how many of these no change explains that was refused in the frame.
-    pub fn judge<T: VertexTree, M: MeshSink>(
-        &mut self,
-        engine: &Engine<T, M>,
-        has_dependencies: bool,
-    ) -> [u64; 2] {
+    pub fn judge<T: Refine<S>, S>(&mut self, engine: &Engine<T, S>, has_dependencies: bool) -> [u64; 2] {
         let wrong = self.wrong(engine);
         let is_all = engine.missing().is_empty();
         [wrong, if is_all { wrong } else { self.unexplained(engine, has_dependencies) }]
@@ -92,11 +106,7 @@ impl BruteForce {
     /// that was not unfolded keeps folded what is below it, and one that was not folded keeps active what is above it.
     /// Where the backend has dependencies beyond structure, a boundary node may have waited for another one: then nodes
     /// that are wrongly folded are explained by any refusal.
-    fn unexplained<T: VertexTree, M: MeshSink>(
-        &mut self,
-        engine: &Engine<T, M>,
-        has_dependencies: bool,
-    ) -> u64 {
+    fn unexplained<T: Refine<S>, S>(&mut self, engine: &Engine<T, S>, has_dependencies: bool) -> u64 {
         self.cut(engine.settings(), engine.views());
         let mut is_active = vec![false; self.nodes.len()];
         engine.for_each_active(|node| is_active[self.places[node.index()] as usize] = true);
@@ -124,8 +134,9 @@ impl BruteForce {
         unexplained
     }
 
-    /// Tests every node and closes upwards; returns the hash and the size of the cut.
-    fn cut(&mut self, settings: &Settings, views: &[View]) -> (u64, usize) {
+    /// Tests every node and closes upwards. The views are relative to the tree's origin, as an engine
+    /// [gives](Engine::views) them.
+    pub fn cut(&mut self, settings: &Settings, views: &[View]) -> Cut {
         let criterion = settings.criterion;
         for (active, node) in self.active.iter_mut().zip(&self.nodes) {
             *active = match settings.normal_cone {
@@ -133,15 +144,16 @@ impl BruteForce {
                 false => criterion.unfold(views, &node.bounds),
             };
         }
-        let (mut hash, mut count) = (0_u64, 0);
+        let mut cut = Cut { hash: 0, nodes: 0, displayed: self.at_first };
         for (at, node) in self.nodes.iter().enumerate().rev() {
             if self.active[at] {
                 node.parents.iter().for_each(|&parent| self.active[parent as usize] = true);
-                hash = hash.wrapping_add(mix(node.log_number));
-                count += 1;
+                cut.hash = cut.hash.wrapping_add(mix(node.log_number));
+                cut.nodes += 1;
+                cut.displayed = cut.displayed.wrapping_add_signed(node.displays);
             }
         }
-        (hash, count)
+        cut
     }
 }
 
@@ -150,19 +162,19 @@ impl BruteForce {
 ///
 /// # Errors
 /// What the backend reports.
-pub fn unfold_all<T: VertexTree, M: MeshSink>(
+pub fn unfold_all<T: Refine<S>, S>(
     tree: &mut T,
-    mesh: &mut M,
+    sink: &mut S,
     mut unfolded: impl FnMut(&T, NodeId) -> ControlFlow<()>,
 ) -> Result<(), TreeError> {
-    let all = unfold_what_can(tree, mesh, &mut unfolded);
-    tree.update_mesh(mesh);
+    let all = unfold_what_can(tree, sink, &mut unfolded);
+    tree.finish(sink);
     all
 }
 
-fn unfold_what_can<T: VertexTree, M: MeshSink>(
+fn unfold_what_can<T: Refine<S>, S>(
     tree: &mut T,
-    mesh: &mut M,
+    sink: &mut S,
     unfolded: &mut impl FnMut(&T, NodeId) -> ControlFlow<()>,
 ) -> Result<(), TreeError> {
     let mut active = vec![false; tree.node_limit() as usize];
@@ -174,7 +186,7 @@ fn unfold_what_can<T: VertexTree, M: MeshSink>(
         if active[node.index()] || !tree.parents(node).all(|parent| active[parent.index()]) {
             continue;
         }
-        match tree.unfold(node, mesh)? {
+        match tree.unfold_into(node, sink)? {
             Step::Done => {
                 active[node.index()] = true;
                 put_off = 0;

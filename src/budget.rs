@@ -1,4 +1,4 @@
-//! Budgets: steering the tolerance so that a frame stays within a number of triangles or a time.
+//! Budgets: steering the tolerance so that a frame stays within what may be displayed or a time.
 //!
 //! The cut stays exact throughout: in every frame it is the one that the criterion asks for at that frame's
 //! tolerance. The tolerance changes by at most a fixed share a frame, and that is a third speed beside the camera's
@@ -15,9 +15,9 @@ pub enum Budget {
     /// No budget: the tolerance of the views stands.
     #[default]
     None,
-    /// At most this many triangles displayed: kept to while the camera rests, and within a few percent while it moves,
+    /// At most so much displayed, as the backend counts it: triangles of a mesh. Kept to while the camera rests, and within a few percent while it moves,
     /// as the tolerance follows what the frame before cost.
-    Triangles(u64),
+    Displayed(u64),
     /// At most this long for a frame. The engine counts its own step; a renderer adds what drawing took through
     /// [`Engine::add_frame_time`](crate::engine::Engine::add_frame_time).
     FrameTime(Duration),
@@ -96,16 +96,16 @@ impl Steering {
 
     /// Steers for the next frame by what this one cost. `moved` says whether the camera did, which makes what was
     /// learnt of the cost out of date; a measured time is always a little out of date.
-    pub fn observe(&mut self, triangles: u64, time: Duration, moved: bool) {
+    pub fn observe(&mut self, displayed: u64, time: Duration, moved: bool) {
         let load = match self.budget {
             Budget::None => return,
-            Budget::Triangles(most) => triangles as f64 / most.max(1) as f64,
+            Budget::Displayed(most) => displayed as f64 / most.max(1) as f64,
             Budget::FrameTime(most) => time.as_secs_f64() / most.as_secs_f64().max(1e-9),
         };
         if moved || matches!(self.budget, Budget::FrameTime(_)) {
             self.too_fine /= 1.0 + STEP;
         }
-        // Triangles grow about inversely with the tolerance: aim at the middle of the dead zone, half the way.
+        // What is displayed grows about inversely with the tolerance: aim at the middle of the dead zone, half the way.
         let aim = (load / (1.0 - DEAD_ZONE / 2.0)).sqrt().clamp(1.0 / (1.0 + STEP), 1.0 + STEP);
         if load > 1.0 {
             self.too_fine = self.factor;

@@ -25,13 +25,13 @@ mod replay;
 mod scene;
 
 use std::ops::{ControlFlow, Range};
-use std::sync::Arc;
+use std::sync::{Arc, mpsc};
 
 use detail_block::XfmTree;
-use in_memory::{Hierarchy, InMemoryTree};
+use in_memory::{InMemoryHierarchy, InMemoryTree};
 use meta_node::MetaNodeTree;
 use mt_partition::MtTree;
-use vertex_tree::{CollapseLog, Mesh, NullSink, TreeError, VertexTree};
+use vertex_tree::{CollapseLog, Mesh, NullSink, Refine, TreeError};
 
 pub use self::error::{CompareError, WrongCut};
 pub use self::loading::Loading;
@@ -44,6 +44,7 @@ use crate::brute_force::{BruteForce, unfold_all};
 use crate::engine::{Engine, FrameReport, Settings};
 use crate::motion::Speed;
 use crate::oracle::Oracle;
+use crate::parallel;
 use crate::path::Path;
 use crate::progress::Progress;
 use crate::refine::Strategy;
@@ -138,7 +139,7 @@ impl Subject {
     /// [`CompareError::Log`].
     pub fn new(name: &str, log: &CollapseLog) -> Result<Self, CompareError> {
         let wrap = |source| CompareError::Log { scene: name.to_owned(), source };
-        let hierarchy = Arc::new(Hierarchy::new(log).map_err(wrap)?);
+        let hierarchy = Arc::new(InMemoryHierarchy::new(log).map_err(wrap)?);
         let check = Some(Check::Log(Oracle::new(log).map_err(wrap)?));
         Ok(Self { name: name.to_owned(), store: Store::InMemory(hierarchy, Arc::new(log.clone())), check })
     }
@@ -189,7 +190,7 @@ impl Subject {
             let mut engine =
                 Engine::new(open(opening)?, ActiveMesh::new(), settings).map_err(|e| self.tree_error(e))?;
             engine.advance(&[view]).map_err(|e| self.tree_error(e))?;
-            Ok(self.placed(engine.mesh()))
+            Ok(self.placed(engine.sink()))
         })
     }
 
@@ -238,7 +239,7 @@ impl Subject {
         let mut mesh = ActiveMesh::new();
         with_trees!(self, |open| {
             let mut tree = open(Opening::SETTLED)?;
-            tree.base_mesh(&mut mesh).map_err(|e| self.tree_error(e))?;
+            tree.start(&mut mesh).map_err(|e| self.tree_error(e))?;
             let count = |_: &_, _| {
                 most -= 1;
                 if most == 0 { ControlFlow::Break(()) } else { ControlFlow::Continue(()) }
@@ -262,7 +263,7 @@ impl Subject {
         }
         with_trees!(self, |open| {
             let mut tree = open(Opening::SETTLED)?;
-            tree.base_mesh(&mut NullSink).map_err(|e| self.tree_error(e))?;
+            tree.start(&mut NullSink).map_err(|e| self.tree_error(e))?;
             BruteForce::new(&mut tree).map(Check::Nodes).map_err(|e| self.tree_error(e))
         })
     }
@@ -303,6 +304,8 @@ impl Subject {
         };
 
         let mut runs: Vec<Run> = Vec::new();
+        // Those that are yet to be compared with an exact strategy.
+        let mut uncompared = Vec::new();
         for &prefetch in prefetch {
             let opening = Opening { paging: options.paging, prefetch, pace: options.pace };
             for &strategy in &options.strategies {
@@ -314,10 +317,7 @@ impl Subject {
                     match check.as_mut() {
                         _ if !is_checked(strategy) => {}
                         Some(check) => replay.check(open(opening)?, check, &mut rows, &mut count)?,
-                        None => {
-                            let beside = open(Opening { paging: options.paging, ..Opening::SETTLED })?;
-                            replay.compare(open(opening)?, beside, &mut rows, &mut count)?;
-                        }
+                        None => uncompared.push((runs.len(), replay)),
                     }
                     rows
                 });
@@ -332,7 +332,40 @@ impl Subject {
                 });
             }
         }
+        for (at, wrong) in self.compare(uncompared, &mut count)? {
+            runs[at].rows.iter_mut().zip(wrong).for_each(|(row, wrong)| row.wrong = Some(wrong));
+        }
         self.check = check;
         Ok(runs)
+    }
+
+    /// For each replay, how many nodes differ from the cut of an exact strategy that waits for its pages, in every frame.
+    /// Nothing is timed here: on virtual time, or settled, several are made at once.
+    fn compare(
+        &self,
+        replays: Vec<(usize, Replay)>,
+        count: &mut impl FnMut(),
+    ) -> Result<Vec<(usize, Vec<u64>)>, CompareError> {
+        let (tick, ticks) = mpsc::channel();
+        let each = |(at, replay): (usize, Replay)| {
+            // Whoever counts is there until all are done.
+            let mut count = || {
+                let _ = tick.send(());
+            };
+            let wrong = with_trees!(self, |open| {
+                let beside = open(Opening { paging: replay.opening.paging, ..Opening::SETTLED })?;
+                replay.compare(open(replay.opening)?, beside, &mut count)?
+            });
+            Ok((at, wrong))
+        };
+        let is_timed = replays.iter().any(|(_, replay)| matches!(replay.opening.pace, Pace::WallClock(_)));
+        std::thread::scope(|scope| {
+            let all = scope.spawn(move || match is_timed {
+                true => replays.into_iter().map(each).collect(),
+                false => parallel::map(replays, each).into_iter().collect(),
+            });
+            ticks.iter().for_each(|()| count());
+            all.join().unwrap_or_else(|panic| std::panic::resume_unwind(panic))
+        })
     }
 }

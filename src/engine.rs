@@ -17,7 +17,7 @@ mod well_formed;
 
 use std::time::{Duration, Instant};
 
-use vertex_tree::{MeshSink, NodeId, PageStats, TreeError, VertexTree};
+use vertex_tree::{NodeId, PageStats, Refine, TreeError};
 
 pub(crate) use self::carried::Carried;
 use self::changes::{Counts, Noted, Steps};
@@ -41,7 +41,7 @@ pub struct Settings {
     /// What "coarse" means.
     pub criterion: Criterion,
     /// Whether a node is only unfolded for views that do not see all below it from behind, where the backend knows
-    /// ([`VertexTree::HAS_CONES`]).
+    /// ([`Hierarchy::HAS_CONES`](vertex_tree::Hierarchy::HAS_CONES)).
     pub normal_cone: bool,
     /// Declared full speed of the eye, in object units a frame. It decides how far ahead the event queue looks, never
     /// the cut. 0, or what is no number above 0, says that the eye is not expected to move: a frame in which it does
@@ -76,8 +76,8 @@ impl Default for Settings {
 pub enum Limit {
     /// The tolerance alone: more detail would not be seen.
     Error,
-    /// The triangle budget.
-    Triangles,
+    /// The budget of what may be displayed.
+    Displayed,
     /// The frame-time budget.
     Time,
     /// Pages that were not in memory, and for which what is there can not make room.
@@ -94,7 +94,7 @@ impl Limit {
     pub fn name(self) -> &'static str {
         match self {
             Self::Error => "error",
-            Self::Triangles => "triangles",
+            Self::Displayed => "triangles",
             Self::Time => "time",
             Self::Memory => "memory",
             Self::Io => "io",
@@ -108,7 +108,7 @@ impl Limit {
 pub struct FrameReport {
     /// The whole refinement step, with what it waited for a real store (see [`PageStats::stalled`]).
     pub select: Duration,
-    /// The part of it spent on folds, unfolds and the mesh.
+    /// The part of it spent on folds, unfolds and what is displayed.
     pub apply: Duration,
     /// Tests of the criterion, by its predicate or its time bounds: of what a strategy looked at, of what came into play, and
     /// of what came to be watched. What is foreseen for other views is not among them.
@@ -126,12 +126,12 @@ pub struct FrameReport {
     pub blocked: u64,
     /// Nodes whose pages were missing for wanted changes: refused in this frame, or before and still waited for.
     pub misses: u64,
-    /// Nodes that the backend was told to expect a change of, see [`VertexTree::will_need`].
+    /// Nodes that the backend was told to expect a change of, see [`Hierarchy::will_need`](vertex_tree::Hierarchy::will_need).
     pub foreseen: u64,
     /// Active nodes at the end.
     pub active_nodes: u64,
-    /// Triangles displayed at the end.
-    pub triangles: u64,
+    /// What is displayed at the end, as the backend counts it: triangles of a mesh. See [`Hierarchy::displayed`](vertex_tree::Hierarchy::displayed).
+    pub displayed: u64,
     /// Hash of the set of active nodes, see [`Front::cut_hash`].
     pub cut_hash: u64,
     /// What kept the detail down.
@@ -167,10 +167,10 @@ impl FrameReport {
     }
 }
 
-/// A front through a hierarchy of backend `T`, reporting the displayed mesh to `M`.
-pub struct Engine<T, M> {
+/// A front through a hierarchy of backend `T`, reporting what is displayed to `S`.
+pub struct Engine<T, S> {
     tree: T,
-    mesh: M,
+    sink: S,
     front: Front,
     cones: Cones,
     finder: Finder,
@@ -199,12 +199,12 @@ pub struct Engine<T, M> {
     foresight: Foresight,
 }
 
-impl<T: VertexTree, M: MeshSink> Engine<T, M> {
-    /// Starts with every node folded: the base mesh.
+impl<T: Refine<S>, S> Engine<T, S> {
+    /// Starts with every node folded: with a mesh, the base mesh.
     ///
     /// # Errors
     /// What the backend reports, and [`TreeError::Origin`].
-    pub fn new(mut tree: T, mut mesh: M, settings: Settings) -> Result<Self, TreeError> {
+    pub fn new(mut tree: T, mut sink: S, settings: Settings) -> Result<Self, TreeError> {
         let origin = tree.origin();
         check_origin(origin).map_err(|_| TreeError::Origin { origin })?;
         let front = Front::new(&tree);
@@ -220,11 +220,11 @@ impl<T: VertexTree, M: MeshSink> Engine<T, M> {
         for root in front.roots() {
             with_strategy!(&mut finder, |s| s.watch(&frame, root, Kind::Unfold, front.bounds(root)));
         }
-        tree.base_mesh(&mut mesh)?;
+        tree.start(&mut sink)?;
         Ok(Self {
             origin,
             tree,
-            mesh,
+            sink,
             front,
             cones: Cones::default(),
             finder,
@@ -262,14 +262,14 @@ impl<T: VertexTree, M: MeshSink> Engine<T, M> {
         &mut self.tree
     }
 
-    /// The displayed mesh.
-    pub fn mesh(&self) -> &M {
-        &self.mesh
+    /// What is displayed, as the sink keeps it.
+    pub fn sink(&self) -> &S {
+        &self.sink
     }
 
-    /// The displayed mesh, to be told that its changes have been taken.
-    pub fn mesh_mut(&mut self) -> &mut M {
-        &mut self.mesh
+    /// The sink, to be told that its changes have been taken.
+    pub fn sink_mut(&mut self) -> &mut S {
+        &mut self.sink
     }
 
     /// The active front.
@@ -277,7 +277,7 @@ impl<T: VertexTree, M: MeshSink> Engine<T, M> {
         &self.front
     }
 
-    /// World coordinates of what the displayed mesh and all spheres are relative to: that of the tree.
+    /// World coordinates of what is displayed and all spheres are relative to: that of the tree.
     pub fn origin(&self) -> [f64; 3] {
         self.origin
     }
@@ -372,7 +372,7 @@ impl<T: VertexTree, M: MeshSink> Engine<T, M> {
         let (applied, counts, tests) = with_strategy!(&mut self.finder, |finder| {
             let mut step = Steps {
                 tree: &mut self.tree,
-                mesh: &mut self.mesh,
+                sink: &mut self.sink,
                 front: &mut self.front,
                 finder,
                 frame: &frame,
@@ -392,7 +392,7 @@ impl<T: VertexTree, M: MeshSink> Engine<T, M> {
             let applied = step.carry_out(&self.flips, &mut self.arrived, self.settings.work_cap, found);
             (applied, step.counts, self.flips.tests + step.tests)
         });
-        self.tree.update_mesh(&mut self.mesh);
+        self.tree.finish(&mut self.sink);
         let distinct = |nodes: &mut Vec<NodeId>| {
             nodes.sort_unstable();
             nodes.dedup();
@@ -417,12 +417,12 @@ impl<T: VertexTree, M: MeshSink> Engine<T, M> {
         let pages = self.tree.end_frame()?;
         let select = start.elapsed();
 
-        let triangles = self.tree.displayed_triangles();
+        let displayed = self.tree.displayed();
         let limit = match self.steering.budget() {
             _ if misses > 0 && pages.no_room > 0 => Limit::Memory,
             _ if misses > 0 => Limit::Io,
             _ if counts.carried > 0 => Limit::Work,
-            Budget::Triangles(_) if self.steering.limits() => Limit::Triangles,
+            Budget::Displayed(_) if self.steering.limits() => Limit::Displayed,
             Budget::FrameTime(_) if self.steering.limits() => Limit::Time,
             _ => Limit::Error,
         };
@@ -432,7 +432,7 @@ impl<T: VertexTree, M: MeshSink> Engine<T, M> {
                 .iter()
                 .zip(&self.views)
                 .any(|(b, v)| b.eye() != v.eye() || b.direction() != v.direction());
-        self.steering.observe(triangles, select + std::mem::take(&mut self.drawing_time), moved);
+        self.steering.observe(displayed, select + std::mem::take(&mut self.drawing_time), moved);
         Ok(FrameReport {
             select,
             apply,
@@ -445,7 +445,7 @@ impl<T: VertexTree, M: MeshSink> Engine<T, M> {
             misses,
             foreseen,
             active_nodes: self.front.active_nodes() as u64,
-            triangles,
+            displayed,
             cut_hash: self.front.cut_hash(),
             limit,
             pages,

@@ -5,7 +5,7 @@
 //! serves as a filter, and what passes is tested against the views that the camera will have at a few instants ahead if it
 //! goes on as it does (see [`trend`](self)): a node is named with the first instant at which it is wrong.
 //!
-//! What is below a node that will unfold is asked of the backend ([`VertexTree::peek`]), down to where its pages end;
+//! What is below a node that will unfold is asked of the backend ([`Hierarchy::peek`]), down to where its pages end;
 //! what is above one that will fold is in the front. Nodes are named in the order of the instants, and of what follows
 //! from what.
 //!
@@ -16,7 +16,7 @@ mod candidates;
 mod trend;
 
 use rustc_hash::FxHashSet;
-use vertex_tree::{Bounds, NodeId, VertexTree};
+use vertex_tree::{Bounds, Hierarchy, NodeId};
 
 use self::candidates::Candidates;
 use self::trend::Trend;
@@ -77,7 +77,7 @@ impl Foresight {
 
     /// Names to `tree` what will change within `look_ahead` frames. `before` are the views of the frame before,
     /// `unfinished` says whether something that is wanted now has been refused. Returns how many nodes were named.
-    pub fn look<T: VertexTree>(
+    pub fn look<T: Hierarchy>(
         &mut self,
         tree: &mut T,
         watched: Watched,
@@ -110,7 +110,7 @@ impl Foresight {
     }
 
     /// Names what is on the agenda, and what follows from it.
-    fn name<T: VertexTree>(&mut self, tree: &mut T, front: &Front, frame: &Frame) -> u64 {
+    fn name<T: Hierarchy>(&mut self, tree: &mut T, front: &Front, frame: &Frame) -> u64 {
         let Self { instants, views, agenda, peeked, named, .. } = self;
         named.clear();
         let count = instants.len();

@@ -13,7 +13,7 @@ mod graph;
 mod well_formed;
 
 use slab::Slab;
-use vertex_tree::{Bounds, NONE, NodeId, VertexTree, prefetch};
+use vertex_tree::{Bounds, Hierarchy, NONE, NodeId, prefetch};
 
 use crate::queue::Kind;
 
@@ -120,7 +120,7 @@ pub struct Front {
 
 impl Front {
     /// With the roots in play.
-    pub(crate) fn new<T: VertexTree>(tree: &T) -> Self {
+    pub(crate) fn new<T: Hierarchy>(tree: &T) -> Self {
         let mut front = Self {
             pairs: vec![Pair([Record::BLANK; 2])],
             above: vec![Slot::NONE],
@@ -274,7 +274,7 @@ impl Front {
 
     /// Where the structural children of an active node are, those in play.
     #[inline(always)]
-    pub(crate) fn children<'a, T: VertexTree>(
+    pub(crate) fn children<'a, T: Hierarchy>(
         &'a self,
         tree: &'a T,
         slot: Slot,
@@ -287,7 +287,7 @@ impl Front {
 
     /// Where the structural parents of a node in play are, those in play.
     #[inline(always)]
-    pub(crate) fn parents<'a, T: VertexTree>(
+    pub(crate) fn parents<'a, T: Hierarchy>(
         &'a self,
         tree: &'a T,
         slot: Slot,
@@ -299,7 +299,7 @@ impl Front {
     }
 
     /// Where a node is; [`Slot::NONE`] if it is not in play. In a tree this follows the links from the node's root down.
-    pub(crate) fn find<T: VertexTree>(&self, tree: &T, node: NodeId) -> Slot {
+    pub(crate) fn find<T: Hierarchy>(&self, tree: &T, node: NodeId) -> Slot {
         if !T::IS_TREE {
             return self.slots[node.index()];
         }
@@ -358,7 +358,7 @@ impl Front {
 
     /// Records that a boundary node of a tree has been unfolded, and that its children come into play.
     #[inline(always)]
-    pub(crate) fn set_active<T: VertexTree>(&mut self, tree: &T, slot: Slot) {
+    pub(crate) fn set_active<T: Hierarchy>(&mut self, tree: &T, slot: Slot) {
         let node = self.node(slot);
         let mut linked = tree.children_and_bounds(node);
         let mut status = ACTIVE;
@@ -388,7 +388,7 @@ impl Front {
 
     /// Records that a collapsible node of a tree has been folded.
     #[inline(always)]
-    pub(crate) fn set_folded<T: VertexTree>(&mut self, tree: &T, slot: Slot) {
+    pub(crate) fn set_folded<T: Hierarchy>(&mut self, tree: &T, slot: Slot) {
         let record = self.record_mut(slot);
         let (node, status, children) = (record.node, record.status, record.children);
         record.status = 0;

@@ -12,7 +12,7 @@
 //! use foldfront::active_mesh::ActiveMesh;
 //! use foldfront::engine::{Engine, Settings};
 //! use foldfront::glam::DVec3;
-//! use foldfront::in_memory::{Hierarchy, InMemoryTree};
+//! use foldfront::in_memory::{InMemoryHierarchy, InMemoryTree};
 //! use foldfront::simplify;
 //! use foldfront::view::{Camera, View, theta_of_pixels};
 //! use foldfront::Mesh;
@@ -29,7 +29,7 @@
 //!     mesh.triangles.push([i, i + 65, i + 64]);
 //! }
 //! let (log, _) = simplify::build(mesh, &simplify::Options::default(), &mut |_, _| {})?;
-//! let hierarchy = Arc::new(Hierarchy::new(&log)?);
+//! let hierarchy = Arc::new(InMemoryHierarchy::new(&log)?);
 //!
 //! // Once a viewer: an engine, with the displayed mesh as vertex and index buffers.
 //! let tree = InMemoryTree::new(hierarchy);
@@ -43,20 +43,21 @@
 //!     let eye = DVec3::new(0.02 * f64::from(frame), -2.0, 1.0);
 //!     let camera = Camera::look_at(eye, DVec3::ZERO, DVec3::Z, 1.0, 16.0 / 9.0)?;
 //!     let report = engine.advance(&[View::new(&camera, theta_of_pixels(1.0, 1080))?])?;
-//!     let buffers = engine.mesh_mut();
+//!     let buffers = engine.sink_mut();
 //!     for &slot in buffers.changed_triangles() {
 //!         // Upload `buffers.triangles()[slot]`, unless the slot is not used any more.
 //!         let _ = buffers.triangles().get(slot as usize);
 //!     }
 //!     buffers.clear_changes();
-//!     assert_eq!(report.triangles, buffers.displayed() as u64);
+//!     assert_eq!(report.displayed, buffers.displayed() as u64);
 //! }
 //! # Ok(())
 //! # }
 //! ```
 //!
 //! Data flows one way: input ([`mesh_io`], [`scene`]), hierarchy ([`simplify`], [`CollapseLog`]), a backend behind
-//! the [`VertexTree`] trait, the [`engine`] with its [`front`], and the displayed mesh ([`active_mesh`]).
+//! the [`VertexTree`] trait, the [`engine`] with its [`front`], and the displayed mesh ([`active_mesh`]). The engine itself knows no
+//! meshes: it works over any [`Hierarchy`] that can [`Refine`] into a sink.
 
 pub mod active_mesh;
 pub mod brute_force;
@@ -107,4 +108,4 @@ pub use in_memory;
 pub use mt_partition;
 pub use vertex_tree;
 pub use vertex_tree::output;
-pub use vertex_tree::{Bounds, Collapse, CollapseLog, Mesh, NodeId, VertexTree};
+pub use vertex_tree::{Bounds, Collapse, CollapseLog, Hierarchy, Mesh, NodeId, Refine, VertexTree};

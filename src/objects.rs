@@ -21,7 +21,7 @@ mod stored;
 use std::time::Duration;
 
 use glam::{DMat3, DQuat, DVec3};
-use vertex_tree::{MeshSink, PageStats, TreeError, VertexTree};
+use vertex_tree::{PageStats, Refine, TreeError};
 
 use crate::engine::{Engine, FrameReport, Limit, Settings};
 use crate::view::{View, ViewError};
@@ -153,16 +153,16 @@ impl Placement {
 }
 
 /// An object: its placement, and the engine that follows the views in its own space.
-pub struct Object<T, M> {
+pub struct Object<T, S> {
     placement: Placement,
-    engine: Engine<T, M>,
+    engine: Engine<T, S>,
 }
 
-impl<T: VertexTree, M: MeshSink> Object<T, M> {
+impl<T: Refine<S>, S> Object<T, S> {
     /// With the settings of the scene.
-    fn new(tree: T, mesh: M, placement: Placement, settings: Settings) -> Result<Self, TreeError> {
+    fn new(tree: T, sink: S, placement: Placement, settings: Settings) -> Result<Self, TreeError> {
         let settings = Settings { rho: settings.rho / placement.scale, ..settings };
-        Ok(Self { placement, engine: Engine::new(tree, mesh, settings)? })
+        Ok(Self { placement, engine: Engine::new(tree, sink, settings)? })
     }
 
     /// Where it is.
@@ -170,13 +170,13 @@ impl<T: VertexTree, M: MeshSink> Object<T, M> {
         &self.placement
     }
 
-    /// Its engine; the displayed mesh is in the object's space.
-    pub fn engine(&self) -> &Engine<T, M> {
+    /// Its engine; what is displayed is in the object's space.
+    pub fn engine(&self) -> &Engine<T, S> {
         &self.engine
     }
 
-    /// Its engine, to take changes of the mesh or to reach the backend.
-    pub fn engine_mut(&mut self) -> &mut Engine<T, M> {
+    /// Its engine, to take what has changed or to reach the backend.
+    pub fn engine_mut(&mut self) -> &mut Engine<T, S> {
         &mut self.engine
     }
 
@@ -196,23 +196,23 @@ impl<T: VertexTree, M: MeshSink> Object<T, M> {
 }
 
 /// The objects of a scene.
-pub struct Objects<T, M> {
-    objects: Vec<Object<T, M>>,
+pub struct Objects<T, S> {
+    objects: Vec<Object<T, S>>,
     views: Vec<View>,
 }
 
-impl<T: VertexTree, M: MeshSink> Objects<T, M> {
+impl<T: Refine<S>, S> Objects<T, S> {
     /// Starts with every object at its coarsest. The settings are those of the scene, with `rho` in its units; a budget
     /// would be each object's own.
     ///
     /// # Errors
     /// What a backend reports.
     pub fn new(
-        parts: impl IntoIterator<Item = (T, M, Placement)>,
+        parts: impl IntoIterator<Item = (T, S, Placement)>,
         settings: Settings,
     ) -> Result<Self, ObjectsError> {
-        let object = |(number, (tree, mesh, placement)): (usize, (T, M, Placement))| {
-            Object::new(tree, mesh, placement, settings)
+        let object = |(number, (tree, sink, placement)): (usize, (T, S, Placement))| {
+            Object::new(tree, sink, placement, settings)
                 .map_err(|source| ObjectsError::Tree { object: number, source })
         };
         let objects = parts.into_iter().enumerate().map(object).collect::<Result<_, _>>()?;
@@ -220,12 +220,12 @@ impl<T: VertexTree, M: MeshSink> Objects<T, M> {
     }
 
     /// The objects, in order.
-    pub fn objects(&self) -> &[Object<T, M>] {
+    pub fn objects(&self) -> &[Object<T, S>] {
         &self.objects
     }
 
     /// The objects, in order.
-    pub fn objects_mut(&mut self) -> &mut [Object<T, M>] {
+    pub fn objects_mut(&mut self) -> &mut [Object<T, S>] {
         &mut self.objects
     }
 
@@ -256,7 +256,7 @@ impl<T: VertexTree, M: MeshSink> Objects<T, M> {
     }
 
     fn for_each_tree(&mut self, f: impl Fn(&mut T) -> Result<(), TreeError>) -> Result<(), ObjectsError> {
-        let f = |(object, it): (usize, &mut Object<T, M>)| {
+        let f = |(object, it): (usize, &mut Object<T, S>)| {
             f(it.engine.tree_mut()).map_err(|source| ObjectsError::Tree { object, source })
         };
         self.objects.iter_mut().enumerate().try_for_each(f)
@@ -291,7 +291,7 @@ fn nothing() -> FrameReport {
         misses: 0,
         foreseen: 0,
         active_nodes: 0,
-        triangles: 0,
+        displayed: 0,
         cut_hash: 0,
         limit: Limit::Error,
         pages: PageStats::default(),
@@ -311,7 +311,7 @@ fn add(all: &mut FrameReport, report: &FrameReport, number: u64) {
     all.misses += report.misses;
     all.foreseen += report.foreseen;
     all.active_nodes += report.active_nodes;
-    all.triangles += report.triangles;
+    all.displayed += report.displayed;
     // The same cut of another object counts as another.
     all.cut_hash = all.cut_hash.wrapping_add(report.cut_hash.wrapping_mul(2 * number + 1));
     if report.limit != Limit::Error {

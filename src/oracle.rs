@@ -3,7 +3,7 @@
 //! Every node of the hierarchy is tested, nothing is remembered and no order is relied on. The cut is the closure
 //! upwards of the nodes that some view wants.
 
-use vertex_tree::{Bounds, CollapseLog, Forest, LogError, NONE, NormalCone, VertexTree};
+use vertex_tree::{Bounds, CollapseLog, Forest, LogError, NONE, NormalCone, Refine};
 
 use crate::criterion::Criterion;
 use crate::engine::Engine;
@@ -112,10 +112,7 @@ impl Oracle {
     }
 
     /// Compares an engine's front with the cut for the engine's own views: `None` if they agree.
-    pub fn compare<T: VertexTree, M: vertex_tree::MeshSink>(
-        &mut self,
-        engine: &Engine<T, M>,
-    ) -> Option<Difference> {
+    pub fn compare<T: Refine<S>, S>(&mut self, engine: &Engine<T, S>) -> Option<Difference> {
         self.cut(engine.settings().criterion, engine.views());
         if self.hash == engine.front().cut_hash() && self.count == engine.front().active_nodes() {
             return None;

@@ -12,7 +12,7 @@
 
 use std::time::Duration;
 
-use vertex_tree::{Bounds, MeshSink, NodeId, NormalCone, PageStats, Step, TreeError, VertexTree};
+use vertex_tree::{Bounds, Hierarchy, NodeId, NormalCone, PageStats, Refine, Step, TreeError};
 
 /// Waits inside of a change until what it needs has come. A change that still is refused then, as memory is too small for
 /// it, is a miss.
@@ -29,7 +29,7 @@ pub struct Settled<T> {
 /// A change that is refused more often is left to the next frame.
 const PATIENCE: usize = 100;
 
-impl<T: VertexTree> Settled<T> {
+impl<T: Hierarchy> Settled<T> {
     /// A backend that waits.
     #[must_use]
     pub fn new(tree: T) -> Self {
@@ -61,7 +61,7 @@ impl<T: VertexTree> Settled<T> {
     }
 }
 
-impl<T: VertexTree> VertexTree for Settled<T> {
+impl<T: Hierarchy> Hierarchy for Settled<T> {
     const IS_TREE: bool = T::IS_TREE;
     const PREPARATION: usize = T::PREPARATION;
     const HAS_CONES: bool = T::HAS_CONES;
@@ -69,8 +69,8 @@ impl<T: VertexTree> VertexTree for Settled<T> {
     fn node_limit(&self) -> u32 {
         self.tree.node_limit()
     }
-    fn displayed_triangles(&self) -> u64 {
-        self.tree.displayed_triangles()
+    fn displayed(&self) -> u64 {
+        self.tree.displayed()
     }
     fn origin(&self) -> [f64; 3] {
         self.tree.origin()
@@ -117,18 +117,6 @@ impl<T: VertexTree> VertexTree for Settled<T> {
     fn log_number(&self, node: NodeId) -> u32 {
         self.tree.log_number(node)
     }
-    fn base_mesh<M: MeshSink>(&mut self, mesh: &mut M) -> Result<(), TreeError> {
-        self.tree.base_mesh(mesh)
-    }
-    fn unfold<M: MeshSink>(&mut self, node: NodeId, mesh: &mut M) -> Result<Step, TreeError> {
-        self.insist(node, |tree| tree.unfold(node, mesh))
-    }
-    fn fold<M: MeshSink>(&mut self, node: NodeId, mesh: &mut M) -> Result<Step, TreeError> {
-        self.insist(node, |tree| tree.fold(node, mesh))
-    }
-    fn update_mesh<M: MeshSink>(&mut self, mesh: &mut M) {
-        self.tree.update_mesh(mesh);
-    }
     fn begin_frame(&mut self, arrived: &mut Vec<NodeId>) -> Result<(), TreeError> {
         arrived.append(&mut self.refused);
         self.tree.begin_frame(arrived)
@@ -145,5 +133,20 @@ impl<T: VertexTree> VertexTree for Settled<T> {
     fn end_frame(&mut self) -> Result<PageStats, TreeError> {
         let stalled = std::mem::take(&mut self.stalled);
         self.tree.end_frame().map(|pages| PageStats { stalled: pages.stalled + stalled, ..pages })
+    }
+}
+
+impl<S, T: Refine<S>> Refine<S> for Settled<T> {
+    fn start(&mut self, sink: &mut S) -> Result<(), TreeError> {
+        self.tree.start(sink)
+    }
+    fn unfold_into(&mut self, node: NodeId, sink: &mut S) -> Result<Step, TreeError> {
+        self.insist(node, |tree| tree.unfold_into(node, sink))
+    }
+    fn fold_into(&mut self, node: NodeId, sink: &mut S) -> Result<Step, TreeError> {
+        self.insist(node, |tree| tree.fold_into(node, sink))
+    }
+    fn finish(&mut self, sink: &mut S) {
+        self.tree.finish(sink);
     }
 }

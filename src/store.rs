@@ -5,7 +5,7 @@ use std::sync::Arc;
 use std::sync::atomic::AtomicBool;
 
 use detail_block::{XfmError, XfmFile};
-use in_memory::Hierarchy;
+use in_memory::InMemoryHierarchy;
 use meta_node::{Dependencies, MetaNodeError, MetaNodeFile};
 use mt_partition::{MtError, MtFile};
 use vertex_tree::source::{FileSource, PageSource};
@@ -141,7 +141,7 @@ pub enum StoreError {
 #[derive(Clone)]
 pub enum Store {
     /// With the log that it came from.
-    InMemory(Arc<Hierarchy>, Arc<CollapseLog>),
+    InMemory(Arc<InMemoryHierarchy>, Arc<CollapseLog>),
     /// See [`Backend::MetaNode`].
     MetaNode(Arc<MetaNodeFile>),
     /// See [`Backend::DetailBlock`].
@@ -256,7 +256,7 @@ impl Store {
     /// # Errors
     /// [`StoreError::Log`].
     pub fn in_memory(log: Arc<CollapseLog>) -> Result<Self, StoreError> {
-        Ok(Self::InMemory(Arc::new(Hierarchy::new(&log)?), log))
+        Ok(Self::InMemory(Arc::new(InMemoryHierarchy::new(&log)?), log))
     }
 
     /// Opens a file that `build` wrote.

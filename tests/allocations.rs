@@ -13,7 +13,7 @@ use foldfront::budget::WorkCap;
 use foldfront::engine::{Engine, Settings};
 use foldfront::refine::Strategy;
 use foldfront::view::View;
-use in_memory::{Hierarchy, InMemoryTree};
+use in_memory::{InMemoryHierarchy, InMemoryTree};
 
 thread_local! {
     static ALLOCATIONS: Cell<u64> = const { Cell::new(0) };
@@ -55,7 +55,7 @@ fn a_path_that_has_been_walked_before_allocates_nothing() {
     {
         let mut random = Random(21);
         let log = random_log(bumpy_grid(40, &mut random), &mut random);
-        let tree = InMemoryTree::new(Arc::new(Hierarchy::new(&log).unwrap()));
+        let tree = InMemoryTree::new(Arc::new(InMemoryHierarchy::new(&log).unwrap()));
         let tree = Foreseen::new(tree, look_ahead);
         let mesh = ActiveMesh::new();
         let settings = Settings { strategy, work_cap, rho: 0.01, omega: 0.01, ..Settings::default() };
@@ -75,7 +75,7 @@ fn a_path_that_has_been_walked_before_allocates_nothing() {
             let (mut changes, mut foreseen, mut carried) = (0, 0, 0);
             for view in std::iter::repeat_n(&views, rounds).flatten() {
                 let report = engine.advance(std::slice::from_ref(view)).unwrap();
-                engine.mesh_mut().clear_changes();
+                engine.sink_mut().clear_changes();
                 changes += report.unfolds + report.folds;
                 foreseen += report.foreseen;
                 carried += report.carried;

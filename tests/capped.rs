@@ -16,10 +16,10 @@ use foldfront::engine::{Engine, FrameReport, Limit, Settings};
 use foldfront::oracle::Oracle;
 use foldfront::refine::Strategy;
 use foldfront::settled::Settled;
-use foldfront::vertex_tree::{Bounds, MeshSink, NodeId, NullSink, VertexTree};
+use foldfront::vertex_tree::{Bounds, Hierarchy, NodeId, NullSink, Refine};
 use foldfront::view::View;
 use glam::DVec3;
-use in_memory::{Hierarchy, InMemoryTree};
+use in_memory::{InMemoryHierarchy, InMemoryTree};
 use mt_partition::MtTree;
 
 const EXACT: [Strategy; 3] = [Strategy::TopDown, Strategy::Front, Strategy::Event];
@@ -33,7 +33,7 @@ fn settings(strategy: Strategy, work_cap: WorkCap) -> Settings {
 }
 
 fn engine(log: &CollapseLog, strategy: Strategy, work_cap: WorkCap) -> Engine<InMemoryTree, ActiveMesh> {
-    let tree = InMemoryTree::new(Arc::new(Hierarchy::new(log).unwrap()));
+    let tree = InMemoryTree::new(Arc::new(InMemoryHierarchy::new(log).unwrap()));
     Engine::new(tree, ActiveMesh::new(), settings(strategy, work_cap)).unwrap()
 }
 
@@ -41,7 +41,7 @@ fn moved(view: &mut View, by: DVec3) {
     *view = view.with_eye(view.eye() + by).unwrap();
 }
 
-fn active<T: VertexTree, M: MeshSink>(engine: &Engine<T, M>) -> BTreeSet<NodeId> {
+fn active<T: Refine<S>, S>(engine: &Engine<T, S>) -> BTreeSet<NodeId> {
     let mut active = BTreeSet::new();
     engine.for_each_active(|node| {
         active.insert(node);

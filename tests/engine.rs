@@ -17,10 +17,10 @@ use foldfront::oracle::Oracle;
 use foldfront::refine::Strategy;
 use foldfront::vertex_tree::NullSink;
 use foldfront::view::View;
-use in_memory::{Hierarchy, InMemoryTree};
+use in_memory::{InMemoryHierarchy, InMemoryTree};
 
 fn engine(log: &CollapseLog, settings: Settings) -> Engine<InMemoryTree, ActiveMesh> {
-    let tree = InMemoryTree::new(Arc::new(Hierarchy::new(log).unwrap()));
+    let tree = InMemoryTree::new(Arc::new(InMemoryHierarchy::new(log).unwrap()));
     let mesh = ActiveMesh::new();
     Engine::new(tree, mesh, settings).unwrap()
 }
@@ -44,7 +44,7 @@ fn shown(engine: &Engine<InMemoryTree, ActiveMesh>) -> BTreeSet<(u32, [u32; 3])>
     let tree = engine.tree();
     let vertex = |slot| tree.input_vertex(slot).expect("a triangle names a hole in the vertex buffer");
     engine
-        .mesh()
+        .sink()
         .displayed_triangles()
         .map(|(slot, corners)| (tree.input_triangle(slot).unwrap(), corners.map(vertex)))
         .collect()
@@ -84,7 +84,7 @@ fn all_strategies_agree_with_the_oracle_and_show_its_mesh() {
                     let difference = oracle.compare(engine);
                     assert_eq!(difference, None, "{strategy:?}, seed {seed}, frame {frame}");
                 }
-                assert_eq!(report.triangles, engine.mesh().displayed() as u64);
+                assert_eq!(report.displayed, engine.sink().displayed() as u64);
                 if frame % 16 == 0 {
                     let mut active = vec![false; log.collapses.len()];
                     let hierarchy = engine.tree().hierarchy();
@@ -106,7 +106,7 @@ fn a_slow_pan_flips_every_node_in_its_frame() {
     let mut random = Random(7);
     let log = random_log(bumpy_grid(24, &mut random), &mut random);
     let mut oracle = Oracle::new(&log).unwrap();
-    let tree = InMemoryTree::new(Arc::new(Hierarchy::new(&log).unwrap()));
+    let tree = InMemoryTree::new(Arc::new(InMemoryHierarchy::new(&log).unwrap()));
     let mut engine = Engine::new(tree, NullSink, Settings { rho: 0.05, ..Settings::default() }).unwrap();
     let mut view = random_view(&mut random);
     let axis = view.direction().any_orthogonal_vector().normalize();
@@ -146,21 +146,21 @@ fn a_triangle_budget_is_met_and_the_cut_stays_exact() {
         let log = random_log(bumpy_grid(40, &mut random), &mut random);
         let mut oracle = Oracle::new(&log).unwrap();
         let settings =
-            Settings { strategy, rho: 0.02, budget: Budget::Triangles(600), ..Settings::default() };
+            Settings { strategy, rho: 0.02, budget: Budget::Displayed(600), ..Settings::default() };
         let mut engine = engine(&log, settings);
         // From outside of every sphere: what the eye is inside of is shown at any tolerance.
         let eye = 5.0 * random.direction();
         let view = random_view(&mut random).with_eye(eye).unwrap();
         let mut view = view.with_direction(-eye.normalize()).unwrap();
         for (budget, frames) in [(600, 500), (200, 500), (1500, 500)] {
-            engine.set_budget(Budget::Triangles(budget));
+            engine.set_budget(Budget::Displayed(budget));
             let mut last = 0;
             for frame in 0..frames {
                 // Moves gently for a while, then lets the tolerance settle.
                 if frame < frames / 2 {
                     turn(&mut view, 0.002, &mut random);
                 }
-                last = engine.advance(&[view]).unwrap().triangles;
+                last = engine.advance(&[view]).unwrap().displayed;
                 engine.assert_well_formed();
                 assert_eq!(oracle.compare(&engine), None, "{strategy:?}, budget {budget}, frame {frame}");
             }
@@ -206,7 +206,7 @@ fn a_renderer_that_patches_only_what_changed_has_the_same_buffers() {
         random_step(&mut view, &mut random);
         engine.advance(&[view]).unwrap();
         engine.assert_well_formed();
-        let mesh = engine.mesh_mut();
+        let mesh = engine.sink_mut();
         vertices.resize(mesh.positions().len(), [0.0; 3]);
         triangles.resize(triangles.len().max(mesh.triangles().len()), [0; 3]);
         for &slot in mesh.changed_vertices() {

@@ -6,6 +6,8 @@ mod buffers;
 mod embed;
 #[path = "../examples/own_backend.rs"]
 mod own_backend;
+#[path = "../examples/points/main.rs"]
+mod points;
 
 #[test]
 fn the_engine_is_embedded() {
@@ -15,6 +17,11 @@ fn the_engine_is_embedded() {
 #[test]
 fn a_backend_of_ones_own_is_refined() {
     own_backend::main().unwrap();
+}
+
+#[test]
+fn points_are_followed() {
+    points::main().unwrap();
 }
 
 #[test]

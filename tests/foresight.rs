@@ -17,24 +17,24 @@ use foldfront::oracle::Oracle;
 use foldfront::path::Path;
 use foldfront::refine::Strategy;
 use foldfront::scene::Scene;
-use foldfront::vertex_tree::{NodeId, NullSink, VertexTree};
+use foldfront::vertex_tree::{Hierarchy, NodeId, NullSink};
 use foldfront::view::{View, theta_of_pixels};
 use glam::{DQuat, DVec3};
-use in_memory::{Hierarchy, InMemoryTree};
+use in_memory::{InMemoryHierarchy, InMemoryTree};
 
 const EXACT: [Strategy; 3] = [Strategy::TopDown, Strategy::Front, Strategy::Event];
 
 type Walker = Engine<Foreseen<InMemoryTree>, NullSink>;
 
-fn walker(hierarchy: &Arc<Hierarchy>, settings: Settings, look_ahead: u32) -> Walker {
+fn walker(hierarchy: &Arc<InMemoryHierarchy>, settings: Settings, look_ahead: u32) -> Walker {
     let tree = Foreseen::new(InMemoryTree::new(hierarchy.clone()), look_ahead);
     Engine::new(tree, NullSink, settings).unwrap()
 }
 
-fn hierarchy(seed: u64, side: usize) -> (CollapseLog, Arc<Hierarchy>) {
+fn hierarchy(seed: u64, side: usize) -> (CollapseLog, Arc<InMemoryHierarchy>) {
     let mut random = Random(seed);
     let log = random_log(bumpy_grid(side, &mut random), &mut random);
-    let hierarchy = Arc::new(Hierarchy::new(&log).unwrap());
+    let hierarchy = Arc::new(InMemoryHierarchy::new(&log).unwrap());
     (log, hierarchy)
 }
 
@@ -206,7 +206,7 @@ fn a_jump_is_not_carried_on() {
 #[test]
 fn most_of_a_recorded_path_is_foreseen() {
     let log = common::data::log(Scene::parse("scene:city").unwrap().mesh(&mut |_, _| ()));
-    let hierarchy = Arc::new(Hierarchy::new(&log).unwrap());
+    let hierarchy = Arc::new(InMemoryHierarchy::new(&log).unwrap());
     for (name, least_recall, least_precision) in [("city-calm", 0.98, 0.94), ("city-wild", 0.85, 0.94)] {
         let file = format!("{}/paths/{name}.path", env!("CARGO_MANIFEST_DIR"));
         let path = Path::read(std::path::Path::new(&file)).unwrap();

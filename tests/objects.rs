@@ -11,7 +11,7 @@ use common::graph_cut::{self, GraphCut};
 use common::{Random, bumpy_grid, data, random_step, random_view};
 use foldfront::criterion::Criterion;
 use foldfront::engine::Settings;
-use foldfront::in_memory::{Hierarchy, InMemoryTree};
+use foldfront::in_memory::{InMemoryHierarchy, InMemoryTree};
 use foldfront::objects::{Objects, Placement, PlacementError, SceneFileError, read_scene};
 use foldfront::oracle::Oracle;
 use foldfront::refine::Strategy;
@@ -187,7 +187,7 @@ fn a_hundred_objects_share_a_budget() {
 fn every_strategy_shows_the_same() {
     let mut random = Random(6);
     let log = data::log(bumpy_grid(24, &mut random));
-    let hierarchy = Arc::new(Hierarchy::new(&log).unwrap());
+    let hierarchy = Arc::new(InMemoryHierarchy::new(&log).unwrap());
     let placements: Vec<Placement> = (0..12).map(|_| random_placement(&mut random, 6.0)).collect();
     let mut scenes: Vec<_> = [Strategy::TopDown, Strategy::Front, Strategy::Event]
         .into_iter()

@@ -20,7 +20,7 @@ use foldfront::refine::Strategy;
 use foldfront::settled::Settled;
 use foldfront::store::{Backend, Store};
 use foldfront::vertex_tree::simulated::Simulated;
-use foldfront::vertex_tree::{NullSink, Prefetch, VertexTree};
+use foldfront::vertex_tree::{Hierarchy, NullSink, Prefetch};
 use foldfront::view::theta_of_pixels;
 use foldfront::{CollapseLog, simplify};
 use meta_node::{InUse, Io, MetaNodeFile, MetaNodeTree};

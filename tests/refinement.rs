@@ -10,9 +10,9 @@ use std::sync::Arc;
 use common::sink::StrictMesh;
 use common::{Random, meshes, random_log};
 use foldfront::scene::SceneKind;
-use foldfront::vertex_tree::{MeshSink, NONE, NodeId, Step, VertexTree};
+use foldfront::vertex_tree::{Hierarchy, MeshSink, NONE, NodeId, Step, VertexTree};
 use foldfront::{CollapseLog, Mesh};
-use in_memory::{Hierarchy, InMemoryTree};
+use in_memory::{InMemoryHierarchy, InMemoryTree};
 use unfolding::{Shown, assert_same, everything_unfolds_and_folds, expected};
 
 #[test]
@@ -72,7 +72,7 @@ fn any_order_of_steps_to_a_cut_shows_what_the_log_says() {
         let vertices = 5 + random.below(60);
         let triangles = random.below(200);
         let log = nonsense(vertices, triangles, &mut random);
-        let hierarchy = Arc::new(Hierarchy::new(&log).unwrap());
+        let hierarchy = Arc::new(InMemoryHierarchy::new(&log).unwrap());
         let mut tree = InMemoryTree::new(hierarchy.clone());
         let mut mesh = StrictMesh::default();
         tree.base_mesh(&mut mesh).unwrap();
@@ -101,7 +101,7 @@ fn any_order_of_steps_to_a_cut_shows_what_the_log_says() {
             tree.update_mesh(&mut mesh);
             let found = strictly_shown(&log, &tree, &mesh);
             assert_same(&found, &expected(&log, &active), &format!("seed {seed}, step {step}"));
-            assert_eq!(tree.displayed_triangles(), mesh.triangles.len() as u64);
+            assert_eq!(tree.displayed(), mesh.triangles.len() as u64);
         }
         let mut nodes: Vec<NodeId> = (0..tree.node_limit()).map(NodeId).collect();
         nodes.retain(|&n| is_active(&active, n));

@@ -10,7 +10,7 @@ use foldfront::engine::Engine;
 use foldfront::path::import::Mode;
 use foldfront::refine::Strategy;
 use foldfront::vertex_tree::simulated::Simulated;
-use foldfront::vertex_tree::{NullSink, Prefetch, VertexTree};
+use foldfront::vertex_tree::{Hierarchy, NullSink, Prefetch};
 use foldfront::view::View;
 use meta_node::{BuildOptions, InUse, Io, MetaNodeTree, Settings};
 

@@ -6,9 +6,9 @@ use foldfront::active_mesh::ActiveMesh;
 use foldfront::engine::{Engine, Settings};
 use foldfront::path::{self, Path};
 use foldfront::refine::Strategy;
-use foldfront::vertex_tree::{MeshSink, NullSink, VertexTree};
+use foldfront::vertex_tree::{Hierarchy, MeshSink, NullSink, VertexTree};
 use foldfront::view::View;
-use in_memory::{Hierarchy, InMemoryTree};
+use in_memory::{InMemoryHierarchy, InMemoryTree};
 use meta_node::{BuildOptions, MetaNodeTree};
 
 use crate::subject::{log, meta_nodes, open, spread, views};
@@ -23,7 +23,7 @@ pub fn table() {
     for name in ["bunny", "dragon"] {
         let Some((log, _)) = log(name) else { continue };
         let file = open(&meta_nodes(name, &log, &BuildOptions::default()));
-        let hierarchy = Arc::new(Hierarchy::new(&log).expect("valid"));
+        let hierarchy = Arc::new(InMemoryHierarchy::new(&log).expect("valid"));
         let walk = path::around(&log.mesh).expect("a place for a camera");
         let views = views(&walk, 1.0);
         for strategy in [Strategy::TopDown, Strategy::Front, Strategy::Event] {
@@ -68,7 +68,7 @@ fn replay<T: VertexTree, M: MeshSink>(
     let advance = |view: &View| {
         let report = engine.advance(std::slice::from_ref(view)).expect("the store is fine");
         assert_eq!(report.misses, 0, "everything is in memory");
-        clear(engine.mesh_mut());
+        clear(engine.sink_mut());
         (report.select.as_nanos() as f64 / 1e3, report.cut_hash)
     };
     views.iter().map(advance).skip(1).collect()

@@ -16,8 +16,8 @@ use std::path::Path;
 use bytemuck::{Pod, Zeroable};
 use foldfront::vertex_tree::source::MappedSource;
 use foldfront::vertex_tree::{
-    Bounds, CollapseLog, LeafTriangle, MeshSink, NONE, NodeId, PageStats, StarMesh, Step, TreeError,
-    VertexTree, output,
+    Bounds, CollapseLog, Hierarchy, LeafTriangle, MeshSink, NONE, NodeId, PageStats, StarMesh, Step,
+    TreeError, VertexTree, output,
 };
 
 #[derive(Clone, Copy, Pod, Zeroable)]
@@ -216,13 +216,13 @@ impl MappedTree {
     }
 }
 
-impl VertexTree for MappedTree {
+impl Hierarchy for MappedTree {
     const IS_TREE: bool = true;
 
     fn node_limit(&self) -> u32 {
         self.counts[0] as u32
     }
-    fn displayed_triangles(&self) -> u64 {
+    fn displayed(&self) -> u64 {
         self.displayed
     }
     fn roots(&self) -> &[NodeId] {
@@ -249,6 +249,12 @@ impl VertexTree for MappedTree {
     fn log_number(&self, node: NodeId) -> u32 {
         self.nodes()[node.index()].log_number
     }
+    fn end_frame(&mut self) -> Result<PageStats, TreeError> {
+        Ok(PageStats::default())
+    }
+}
+
+impl VertexTree for MappedTree {
     fn base_mesh<M: MeshSink>(&mut self, mesh: &mut M) -> Result<(), TreeError> {
         self.displayed = (self.counts[2] - self.counts[3]) as u64;
         let base = &self.corners()[self.counts[3]..];
@@ -285,8 +291,5 @@ impl VertexTree for MappedTree {
         if let Some(stars) = &mut self.mesh {
             stars.update(mesh);
         }
-    }
-    fn end_frame(&mut self) -> Result<PageStats, TreeError> {
-        Ok(PageStats::default())
     }
 }

@@ -10,7 +10,7 @@ use std::collections::BTreeSet;
 
 use foldfront::engine::Engine;
 use foldfront::refine::Strategy;
-use foldfront::vertex_tree::{NodeId, NullSink, VertexTree};
+use foldfront::vertex_tree::{Hierarchy, NodeId, NullSink};
 use foldfront::view::View;
 use meta_node::{BuildOptions, MetaNodeFile, MetaNodeTree};
 

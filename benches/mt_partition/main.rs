@@ -34,7 +34,7 @@ use foldfront::vertex_tree::{MeshSink, NullSink, VertexTree, read_log, write_log
 use foldfront::view::{Camera, View, theta_of_pixels};
 use foldfront::{CollapseLog, Mesh, mesh_io, simplify};
 use glam::DVec3;
-use in_memory::{Hierarchy, InMemoryTree};
+use in_memory::{InMemoryHierarchy, InMemoryTree};
 use mt_partition::{BuildOptions, CacheMode, MtFile, MtTree, WriteReport};
 
 const EXPERIMENTS: [&str; 5] = ["reduction", "figures", "within", "selection", "scene"];
@@ -171,11 +171,14 @@ fn reduction(log: &CollapseLog) {
     let views = views(&path);
     let mean = |sum: u64| sum as f64 / views.len() as f64;
     let settings = settings(&path, Strategy::TopDown);
-    let mut exact =
-        Engine::new(InMemoryTree::new(Arc::new(Hierarchy::new(log).expect("a log"))), NullSink, settings)
-            .expect("nothing can fail in memory");
+    let mut exact = Engine::new(
+        InMemoryTree::new(Arc::new(InMemoryHierarchy::new(log).expect("a log"))),
+        NullSink,
+        settings,
+    )
+    .expect("nothing can fail in memory");
     let mut triangles = Vec::new();
-    replay(&mut exact, &views, |report, _| triangles.push(report.triangles));
+    replay(&mut exact, &views, |report, _| triangles.push(report.displayed));
     let least = mean(triangles.iter().sum());
     println!("single collapses: {least:.0} triangles displayed on average");
     for patch in [0.0, 3.0, 5.0, 10.0, 20.0, 40.0] {
@@ -187,8 +190,8 @@ fn reduction(log: &CollapseLog) {
         let (mut sum, mut ratios) = (0, Vec::new());
         replay(&mut engine, &views, |report, _| {
             let before: u64 = triangles[ratios.len()];
-            ratios.push(report.triangles as f64 / before as f64);
-            sum += report.triangles;
+            ratios.push(report.displayed as f64 / before as f64);
+            sum += report.displayed;
         });
         ratios.sort_by(f64::total_cmp);
         println!(

@@ -9,9 +9,9 @@ use foldfront::path::import::{Mode, Options, import};
 use foldfront::path::{self, Path};
 use foldfront::refine::Strategy;
 use foldfront::vertex_tree::source::FileSource;
-use foldfront::vertex_tree::{NullSink, VertexTree};
+use foldfront::vertex_tree::{Hierarchy, NullSink, VertexTree};
 use foldfront::view::View;
-use in_memory::{Hierarchy, InMemoryTree};
+use in_memory::{InMemoryHierarchy, InMemoryTree};
 use meta_node::{MetaNodeFile, MetaNodeTree};
 use mt_partition::{BuildOptions, CacheMode};
 
@@ -24,7 +24,7 @@ const FRAMES: usize = 1200;
 
 pub fn selection(log: &CollapseLog) {
     let (file, _) = build(log, &BuildOptions::default());
-    let hierarchy = Arc::new(Hierarchy::new(log).expect("a log"));
+    let hierarchy = Arc::new(InMemoryHierarchy::new(log).expect("a log"));
     let meta_file = meta_nodes(log);
     for path in paths(log) {
         let mut views = views(&path);
@@ -117,7 +117,7 @@ impl Figures {
         Self {
             idle_ns: idle / f64::from(count.max(1)),
             ns: mean(&|r| r.select.as_nanos() as u64),
-            triangles: mean(&|r| r.triangles),
+            triangles: mean(&|r| r.displayed),
             tests: mean(&|r| r.tests),
             changes: mean(&|r| r.unfolds + r.folds),
         }

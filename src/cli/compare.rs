@@ -267,7 +267,7 @@ fn write(file: &FilePath, text: &str) -> Result<()> {
 
 fn options(command: &Compare) -> Options {
     let budget = match (command.triangles, command.frame_time) {
-        (Some(most), _) => Budget::Triangles(most),
+        (Some(most), _) => Budget::Displayed(most),
         (None, Some(most)) => Budget::FrameTime(most),
         (None, None) => Budget::None,
     };

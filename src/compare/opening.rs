@@ -2,7 +2,7 @@
 
 use meta_node::InUse;
 use mt_partition::Memory;
-use vertex_tree::VertexTree;
+use vertex_tree::Hierarchy;
 use vertex_tree::simulated::Simulated;
 
 use super::{Loading, Pace, Paging};
@@ -70,7 +70,7 @@ impl Opening {
         self.pace == Pace::Settled || self.prefetch == Loading::Blocking
     }
 
-    pub fn wrap<T: VertexTree>(&self, tree: T) -> Settled<T> {
+    pub fn wrap<T: Hierarchy>(&self, tree: T) -> Settled<T> {
         Settled::waiting(tree, self.waits())
     }
 }

@@ -3,8 +3,7 @@
 use std::ops::Range;
 use std::time::{Duration, Instant};
 
-use rustc_hash::FxHashSet;
-use vertex_tree::{MeshSink, NodeId, NullSink, VertexTree};
+use vertex_tree::{Hierarchy, NodeId, NullSink, Refine, VertexTree};
 
 use super::{Check, CompareError, Opening, Pace, Row, Subject, WrongCut};
 use crate::active_mesh::ActiveMesh;
@@ -28,14 +27,14 @@ const FIRST_ROUNDS: usize = 200;
 
 impl Replay<'_> {
     /// Replays the path, and calls `after` with each frame, its view and its report.
-    fn run<T: VertexTree, M: MeshSink>(
+    fn run<T: Refine<S>, S>(
         &self,
         tree: Settled<T>,
-        mesh: M,
-        mut after: impl FnMut(usize, &mut Engine<Settled<T>, M>, FrameReport) -> Result<(), CompareError>,
+        sink: S,
+        mut after: impl FnMut(usize, &mut Engine<Settled<T>, S>, FrameReport) -> Result<(), CompareError>,
     ) -> Result<(), CompareError> {
         let wrap = |e| self.subject.tree_error(e);
-        let mut engine = Engine::new(tree, mesh, self.settings).map_err(wrap)?;
+        let mut engine = Engine::new(tree, sink, self.settings).map_err(wrap)?;
         let mut start = Instant::now();
         // While a frame waits for the store the path does not go on.
         let mut stalled = Duration::ZERO;
@@ -63,9 +62,9 @@ impl Replay<'_> {
     }
 
     /// A viewer shows nothing before it has what its first frame needs. All of that is reported as one frame.
-    fn first_frame<T: VertexTree, M: MeshSink>(
+    fn first_frame<T: Refine<S>, S>(
         &self,
-        engine: &mut Engine<Settled<T>, M>,
+        engine: &mut Engine<Settled<T>, S>,
         views: &[View],
     ) -> Result<FrameReport, CompareError> {
         let wrap = |e| self.subject.tree_error(e);
@@ -88,7 +87,7 @@ impl Replay<'_> {
     ) -> Result<Vec<Row>, CompareError> {
         let mut rows = Vec::with_capacity(self.views.len());
         self.run(tree, ActiveMesh::new(), |frame, engine, report| {
-            engine.mesh_mut().clear_changes();
+            engine.sink_mut().clear_changes();
             rows.push(Row { frame, report, wrong: None });
             count();
             Ok(())
@@ -146,35 +145,33 @@ impl Replay<'_> {
         })
     }
 
-    /// Compares every frame with the cut of an exact strategy that waits for its pages.
+    /// How many nodes differ from the cut of an exact strategy that waits for its pages, in every frame.
     pub fn compare<T: VertexTree>(
         &self,
         tree: Settled<T>,
         beside: Settled<T>,
-        rows: &mut [Row],
         count: &mut impl FnMut(),
-    ) -> Result<(), CompareError> {
+    ) -> Result<Vec<u64>, CompareError> {
         let wrap = |e| self.subject.tree_error(e);
+        let mut differs = vec![0_u64; tree.node_limit().div_ceil(64) as usize];
         let settings = Settings { strategy: Strategy::Front, ..self.settings };
         let mut exact = Engine::new(beside, NullSink, settings).map_err(wrap)?;
-        let mut rows = rows.iter_mut();
-        let mut active: FxHashSet<NodeId> = FxHashSet::default();
+        let mut all = Vec::with_capacity(self.views.len());
         self.run(tree, NullSink, |_, engine, _| {
             exact.advance_relative(engine.views()).map_err(wrap)?;
             let mut wrong = 0;
             if exact.front().cut_hash() != engine.front().cut_hash() {
-                active.clear();
-                exact.for_each_active(|node| {
-                    active.insert(node);
-                });
-                engine.for_each_active(|node| wrong += u64::from(!active.remove(&node)));
-                wrong += active.len() as u64;
+                let mut turn = |node: NodeId| differs[node.index() / 64] ^= 1 << (node.0 % 64);
+                exact.for_each_active(&mut turn);
+                engine.for_each_active(&mut turn);
+                // What differs is turned back as it is counted.
+                let words = differs.iter_mut().map(std::mem::take);
+                wrong = words.map(|word| u64::from(word.count_ones())).sum();
             }
-            if let Some(row) = rows.next() {
-                row.wrong = Some(wrong);
-            }
+            all.push(wrong);
             count();
             Ok(())
-        })
+        })?;
+        Ok(all)
     }
 }

@@ -25,7 +25,7 @@
 
 use std::time::{Duration, Instant};
 
-use vertex_tree::{MeshSink, TreeError, VertexTree};
+use vertex_tree::{Refine, TreeError};
 
 use super::carried::{A_FRAME, HEAPS, Urgent};
 use super::changes::{Noted, Steps, is_boundary, is_collapsible};
@@ -59,7 +59,7 @@ enum Folds {
     AtMost(u64),
 }
 
-impl<T: VertexTree, M: MeshSink, F: Watch> Steps<'_, T, M, F> {
+impl<T: Refine<S>, S, F: Watch> Steps<'_, T, S, F> {
     /// Folds and unfolds, and whatever follows, within a cap. `start` is when the work began.
     pub(super) fn apply_within(&mut self, cap: WorkCap, start: Instant) -> Result<(), TreeError> {
         self.carried.begin_frame(self.frame.motion != Motion::Rest);
@@ -251,7 +251,7 @@ impl<T: VertexTree, M: MeshSink, F: Watch> Steps<'_, T, M, F> {
 }
 
 /// Whether a node that was noted can still change that way.
-fn is_due<T, M, F>(steps: &Steps<'_, T, M, F>, kind: Kind, noted: Noted) -> bool {
+fn is_due<T, S, F>(steps: &Steps<'_, T, S, F>, kind: Kind, noted: Noted) -> bool {
     match kind {
         Kind::Fold => is_collapsible(steps.front, noted),
         Kind::Unfold => is_boundary(steps.front, noted),

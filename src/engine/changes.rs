@@ -5,7 +5,7 @@
 
 use std::time::Instant;
 
-use vertex_tree::{MeshSink, NodeId, Step, TreeError, VertexTree};
+use vertex_tree::{NodeId, Refine, Step, TreeError};
 
 use super::carried::Carried;
 use super::needs::Pending;
@@ -35,9 +35,9 @@ const TOGETHER: usize = 8;
 const MOST_STEPS: usize = 8;
 
 /// Carries out status changes and what follows from them.
-pub(super) struct Steps<'a, T, M, F> {
+pub(super) struct Steps<'a, T, S, F> {
     pub tree: &'a mut T,
-    pub mesh: &'a mut M,
+    pub sink: &'a mut S,
     pub front: &'a mut Front,
     pub finder: &'a mut F,
     pub frame: &'a Frame<'a>,
@@ -64,7 +64,7 @@ pub(super) struct Steps<'a, T, M, F> {
     pub tests: u64,
 }
 
-impl<T: VertexTree, M: MeshSink, F: Watch> Steps<'_, T, M, F> {
+impl<T: Refine<S>, S, F: Watch> Steps<'_, T, S, F> {
     /// Carries out what a strategy has found and what has waited for `arrived`, within a cap on work that began at `start`.
     pub fn carry_out(
         &mut self,
@@ -235,7 +235,7 @@ impl<T: VertexTree, M: MeshSink, F: Watch> Steps<'_, T, M, F> {
         if !is_collapsible(self.front, (slot, node)) {
             return Ok(());
         }
-        match self.tree.fold(node, self.mesh)? {
+        match self.tree.fold_into(node, self.sink)? {
             Step::Done => {}
             Step::NotResident => {
                 self.wait_for((slot, node), Kind::Fold, node);
@@ -305,7 +305,7 @@ impl<T: VertexTree, M: MeshSink, F: Watch> Steps<'_, T, M, F> {
         if !is_boundary(self.front, (slot, node)) {
             return Ok(());
         }
-        match self.tree.unfold(node, self.mesh)? {
+        match self.tree.unfold_into(node, self.sink)? {
             Step::Done => self.unfolded(slot),
             step => {
                 self.stack.push(Pending::wanted((slot, node)));

@@ -3,7 +3,7 @@
 //! A node that the backend does not unfold because it needs another ([`Step::Needs`]) waits on a stack, the other on top of it,
 //! with its ancestors on top of that, until what is on top can be unfolded.
 
-use vertex_tree::{MeshSink, NodeId, Step, TreeError, VertexTree};
+use vertex_tree::{NodeId, Refine, Step, TreeError};
 
 use super::changes::{Noted, Steps, is_boundary};
 use crate::front::Slot;
@@ -31,7 +31,7 @@ impl Pending {
     }
 }
 
-impl<T: VertexTree, M: MeshSink, F: Watch> Steps<'_, T, M, F> {
+impl<T: Refine<S>, S, F: Watch> Steps<'_, T, S, F> {
     /// Unfolds what waits on the stack, from the top.
     #[cold]
     pub(super) fn unfold_needed(&mut self) -> Result<(), TreeError> {
@@ -54,7 +54,7 @@ impl<T: VertexTree, M: MeshSink, F: Watch> Steps<'_, T, M, F> {
                 }
                 continue;
             }
-            match self.tree.unfold(node, self.mesh)? {
+            match self.tree.unfold_into(node, self.sink)? {
                 Step::Done => {
                     self.stack.pop();
                     if needed && !self.wanted(slot) {

@@ -6,7 +6,7 @@
 //! miss. When what it waits for is among the arrivals, it takes its turn again; when it is not wanted any more, the backend
 //! is told so.
 
-use vertex_tree::{MeshSink, NodeId, VertexTree};
+use vertex_tree::{NodeId, Refine};
 
 use super::changes::{Noted, Steps};
 use crate::front::{Front, Slot};
@@ -60,7 +60,7 @@ impl Waiting {
     }
 }
 
-impl<T: VertexTree, M: MeshSink, F: Watch> Steps<'_, T, M, F> {
+impl<T: Refine<S>, S, F: Watch> Steps<'_, T, S, F> {
     /// Sets a change aside that the backend has refused for want of the page of `awaited`.
     pub(super) fn wait_for(&mut self, (slot, node): Noted, kind: Kind, awaited: NodeId) {
         self.missing.push(awaited);

@@ -1,17 +1,17 @@
 //! Whether an engine's state is what it should be.
 
-use vertex_tree::{Bounds, MeshSink, VertexTree};
+use vertex_tree::{Bounds, Hierarchy};
 
 use super::Engine;
 use crate::front::Slot;
 use crate::queue::Kind;
 use crate::refine::Finder;
 
-impl<T: VertexTree, M: MeshSink> Engine<T, M> {
+impl<T: Hierarchy, S> Engine<T, S> {
     /// Checks the whole state between two frames: the front's records, links and counts against the backend's structure; that
     /// each boundary node and each collapsible node is watched exactly once, for the change that it is due for, by the
     /// strategy or among the changes set aside, and nothing else is; the strategy's own lists; and what the backend can
-    /// say of itself ([`VertexTree::assert_well_formed`]). It takes time with the front and asks the backend about every
+    /// say of itself ([`Hierarchy::assert_well_formed`]). It takes time with the front and asks the backend about every
     /// node in play, of which some may have to be read: for tests, after every frame.
     ///
     /// # Panics

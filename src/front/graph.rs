@@ -4,14 +4,14 @@
 //! each of these is looked at once: what becomes a boundary node or collapsible, or ceases to be, is noted in passing, and
 //! whether a child's other parents are active is a bit in an array that stays in the nearest cache.
 
-use vertex_tree::{NodeId, VertexTree};
+use vertex_tree::{Hierarchy, NodeId};
 
 use super::{ACTIVE, Front, MANY, Record, Slot, mix};
 
 impl Front {
     /// Records that a boundary node has been unfolded. Calls `hold` with those of its parents that were collapsible, and
     /// appends the children that are boundary nodes now to `ready`.
-    pub(crate) fn set_active_in_graph<T: VertexTree>(
+    pub(crate) fn set_active_in_graph<T: Hierarchy>(
         &mut self,
         tree: &T,
         slot: Slot,
@@ -84,7 +84,7 @@ impl Front {
 
     /// Records that a collapsible node has been folded. Calls `release` with those of its children that were in play, and
     /// appends the parents that are collapsible now to `ready`.
-    pub(crate) fn set_folded_in_graph<T: VertexTree>(
+    pub(crate) fn set_folded_in_graph<T: Hierarchy>(
         &mut self,
         tree: &T,
         slot: Slot,

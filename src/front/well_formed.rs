@@ -1,6 +1,6 @@
 //! Whether the front's records are what they should be.
 
-use vertex_tree::{NONE, NodeId, VertexTree};
+use vertex_tree::{Hierarchy, NONE, NodeId};
 
 use super::{ACTIVE, COUNT, Front, MANY, Record, Slot, mix};
 
@@ -11,7 +11,7 @@ impl Front {
     /// # Panics
     /// At the first thing that is wrong.
     #[track_caller]
-    pub(crate) fn assert_well_formed<T: VertexTree>(&self, tree: &T) {
+    pub(crate) fn assert_well_formed<T: Hierarchy>(&self, tree: &T) {
         let mut known = vec![false; self.pairs.len()];
         known[0] = true;
         for &pair in &self.free {
@@ -66,7 +66,7 @@ impl Front {
 
     /// Checks what a record says of the nodes around its own.
     #[track_caller]
-    fn assert_record<T: VertexTree>(&self, tree: &T, slot: Slot, record: &Record) {
+    fn assert_record<T: Hierarchy>(&self, tree: &T, slot: Slot, record: &Record) {
         let node = record.node;
         let is_active = |node: NodeId| {
             let slot = self.slots[node.index()];

@@ -2,7 +2,7 @@
 
 use std::time::Duration;
 
-use vertex_tree::{MeshSink, TreeError, VertexTree};
+use vertex_tree::{NullSink, Refine, TreeError};
 
 use super::stored::{ObjectLine, StoredSceneError};
 use super::{Object, ObjectsError, together};
@@ -28,7 +28,7 @@ pub(super) trait AnyObject {
 }
 
 /// With whether nodes depend on others than those above and below.
-impl<T: VertexTree, M: MeshSink> AnyObject for (Object<T, M>, bool) {
+impl<S, T: Refine<S> + Refine<NullSink>> AnyObject for (Object<T, S>, bool) {
     fn advance(
         &mut self,
         number: usize,

@@ -19,7 +19,7 @@ use in_memory::InMemoryTree;
 use meta_node::MetaNodeTree;
 use mt_partition::{Memory, MtTree, Reader};
 use rustc_hash::FxHashMap;
-use vertex_tree::{LogError, NullSink, TreeError, VertexTree};
+use vertex_tree::{LogError, NullSink, Refine, TreeError};
 
 use super::any::{AnyObject, StoredObjects};
 use super::scene_file::read_lines;
@@ -342,7 +342,7 @@ impl StoredScene {
 }
 
 /// An engine over a tree, at its place in the scene.
-fn place<T: VertexTree + 'static>(
+fn place<T: Refine<NullSink> + 'static>(
     tree: T,
     object: &StoredObject,
     settings: Settings,

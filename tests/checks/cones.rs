@@ -58,7 +58,7 @@ pub fn what_is_seen_from_behind_stays_coarse(log: &CollapseLog, k: f64, spared: 
             for engine in &mut engines {
                 let report = engine.advance(&views).unwrap();
                 let name = engine.settings().strategy.name();
-                let found = (report.cut_hash, report.active_nodes, report.triangles);
+                let found = (report.cut_hash, report.active_nodes, report.displayed);
                 assert_eq!(found, expected, "{name}, frame {frame}");
                 assert_eq!(report.forced + report.misses, 0, "{name}, frame {frame}");
                 match engine.settings().strategy {
@@ -69,7 +69,7 @@ pub fn what_is_seen_from_behind_stays_coarse(log: &CollapseLog, k: f64, spared: 
                 if frame % 60 == 0 {
                     assert_eq!(all.wrong(engine), 0, "{name}, frame {frame}");
                     engine.assert_well_formed();
-                    assert_closed(engine.mesh());
+                    assert_closed(engine.sink());
                 }
             }
             with += expected.1;

@@ -12,7 +12,7 @@ use foldfront::front::mix;
 use foldfront::path::around;
 use foldfront::refine::Strategy;
 use foldfront::vertex_tree::source::{Faults, Faulty, MemorySource};
-use foldfront::vertex_tree::{NONE, VertexTree};
+use foldfront::vertex_tree::{Hierarchy, NONE};
 use foldfront::view::{View, theta_of_pixels};
 use foldfront::{CollapseLog, Mesh};
 use glam::DVec3;
@@ -54,14 +54,14 @@ pub fn flies(name: &str, log: &CollapseLog, is_manifold: bool, is_closed: bool) 
     for frame in (0..path.frames.len()).step_by(60) {
         let view = path.view(frame, theta_of_pixels(1.0, 1080)).unwrap();
         let report = advance_settled(&mut engine, &[view]);
-        let found = (report.cut_hash, report.active_nodes, report.triangles);
+        let found = (report.cut_hash, report.active_nodes, report.displayed);
         assert_eq!(found, cut.find(&settings, engine.views()), "{name}, frame {frame}");
         assert_eq!(report.forced, 0, "{name}, frame {frame}: bounds are nested over all needs");
         engine.assert_well_formed();
         if is_closed {
-            assert_closed(engine.mesh());
+            assert_closed(engine.sink());
         }
-        most = report.triangles.max(most);
+        most = report.displayed.max(most);
     }
     assert!(most > report.initial_faces + 1000, "{name}: next to nothing is shown");
     // Looking in all directions, with every sphere too large: the input, triangle for triangle.
@@ -83,7 +83,7 @@ pub fn flies(name: &str, log: &CollapseLog, is_manifold: bool, is_closed: bool) 
         keys.sort_unstable();
         keys
     };
-    assert!(keys(&engine.mesh().to_mesh()) == keys(&log.mesh), "{name}: fully refined it is not the input");
+    assert!(keys(&engine.sink().to_mesh()) == keys(&log.mesh), "{name}: fully refined it is not the input");
 }
 
 pub fn assert_closed(mesh: &ActiveMesh) {
@@ -130,7 +130,7 @@ pub fn forced_cuts_are_the_closure(log: &CollapseLog, frames: usize) {
             (forced, changes) = (forced + report.forced, changes + report.unfolds);
             if frame % 50 == 0 {
                 engine.assert_well_formed();
-                assert_closed(engine.mesh());
+                assert_closed(engine.sink());
             }
         }
     }
@@ -167,7 +167,7 @@ pub fn a_bad_store_delays_and_no_more(log: &CollapseLog) {
             source.set(Faults::default());
             engine.tree_mut().settle().unwrap();
             let report = advance_settled(&mut engine, &[placed(&log.mesh, view)]);
-            let found = (report.cut_hash, report.active_nodes, report.triangles);
+            let found = (report.cut_hash, report.active_nodes, report.displayed);
             assert_eq!(found, cut.find(&settings, engine.views()), "round {round}");
         }
         eprintln!("{faults} faults counted, {} befallen, {:?}", source.befallen(), engine.tree().counts());

@@ -4,7 +4,7 @@ use std::sync::Arc;
 
 use foldfront::criterion::Criterion;
 use foldfront::engine::{Engine, Settings};
-use foldfront::vertex_tree::{MeshSink, VertexTree};
+use foldfront::vertex_tree::{Hierarchy, MeshSink};
 use foldfront::view::View;
 use foldfront::{CollapseLog, Mesh};
 use glam::DVec3;
@@ -51,7 +51,7 @@ fn canonical(triangles: impl Iterator<Item = [u32; 3]>) -> Vec<[u32; 3]> {
 
 pub fn displayed(engine: &Engine<MtTree, StrictMesh>) -> Vec<[u32; 3]> {
     let vertex = |slot| engine.tree().input_vertex(slot).unwrap();
-    canonical(engine.mesh().triangles.values().map(|t| t.map(vertex)))
+    canonical(engine.sink().triangles.values().map(|t| t.map(vertex)))
 }
 
 fn input(mesh: &Mesh) -> Vec<[u32; 3]> {
@@ -66,7 +66,7 @@ pub fn assert_finest_is_input(file: &Arc<MtFile>, mesh: &Mesh) {
     advance_settled(&mut engine, &all_around(center.into()));
     assert!(displayed(&engine) == input(mesh), "the finest cut is not the input");
     advance_settled(&mut engine, &[]);
-    assert_eq!(engine.mesh().triangles.len(), file.base_triangles() as usize);
+    assert_eq!(engine.sink().triangles.len(), file.base_triangles() as usize);
 }
 
 /// Whatever is wrong with a mesh: the file verifies, the requested patches are reached, and the finest cut is the input.

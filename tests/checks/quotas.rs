@@ -8,7 +8,7 @@ use foldfront::engine::Engine;
 use foldfront::path::around;
 use foldfront::refine::Strategy;
 use foldfront::vertex_tree::simulated::Simulated;
-use foldfront::vertex_tree::{NullSink, Prefetch, VertexTree};
+use foldfront::vertex_tree::{Hierarchy, NullSink, Prefetch};
 use foldfront::view::theta_of_pixels;
 
 use crate::common::backends::combinations;
@@ -106,7 +106,7 @@ pub fn at_rest_the_cut_is_reached_or_loading_ends(log: &CollapseLog) {
                 );
             }
             waited -= frame_time * quiet;
-            let found = (report.cut_hash, report.active_nodes, report.triangles);
+            let found = (report.cut_hash, report.active_nodes, report.displayed);
             let wanted = cut.find(engine.settings(), engine.views());
             if quota == u64::MAX {
                 assert_eq!(found, wanted, "{strategy:?}, {prefetch:?}");

@@ -5,10 +5,10 @@ use std::sync::Arc;
 use foldfront::active_mesh::ActiveMesh;
 use foldfront::cut::Displayed;
 use foldfront::engine::{Engine, Settings};
-use foldfront::vertex_tree::{NONE, Step, VertexTree};
+use foldfront::vertex_tree::{Hierarchy, NONE, Step, VertexTree};
 use foldfront::{CollapseLog, Mesh};
 use glam::DVec3;
-use in_memory::{Hierarchy, InMemoryTree};
+use in_memory::{InMemoryHierarchy, InMemoryTree};
 
 use crate::common::{Random, data, random_step, random_view};
 
@@ -28,7 +28,7 @@ pub fn expected(log: &CollapseLog, active: &[bool]) -> Shown {
 /// What the buffers of a renderer show.
 fn shown(log: &CollapseLog, tree: &InMemoryTree, mesh: &ActiveMesh) -> Shown {
     let mut shown = vec![[NONE; 3]; log.mesh.triangles.len()];
-    assert_eq!(mesh.displayed() as u64, tree.displayed_triangles());
+    assert_eq!(mesh.displayed() as u64, tree.displayed());
     for (id, corners) in mesh.displayed_triangles() {
         let at = &mut shown[tree.input_triangle(id).unwrap() as usize];
         assert_eq!(*at, [NONE; 3], "triangle {id} is in the buffer twice");
@@ -51,7 +51,7 @@ pub fn assert_same(found: &Shown, expected: &Shown, what: &str) {
 pub fn everything_unfolds_and_folds(name: &str, input: &Mesh) {
     let log = data::log(input.clone());
     assert!(log.mesh == *input, "{name}: the input has changed");
-    let hierarchy = Arc::new(Hierarchy::new(&log).unwrap());
+    let hierarchy = Arc::new(InMemoryHierarchy::new(&log).unwrap());
     let mut tree = InMemoryTree::new(hierarchy.clone());
     let mut mesh = ActiveMesh::new();
     let base = expected(&log, &vec![false; log.collapses.len()]);
@@ -74,7 +74,7 @@ pub fn everything_unfolds_and_folds(name: &str, input: &Mesh) {
     tree.update_mesh(&mut mesh);
     assert_eq!(unfolded.len(), log.collapses.len(), "{name}");
     assert_same(&shown(&log, &tree, &mesh), &input.triangles, &format!("{name}, all unfolded"));
-    assert_eq!(tree.displayed_triangles(), input.triangles.len() as u64);
+    assert_eq!(tree.displayed(), input.triangles.len() as u64);
     assert_eq!(mesh.displayed_vertices(), input.positions.len());
 
     // Folding goes another way: from the last to the first in depth-first order, not in the reverse of above.
@@ -84,13 +84,13 @@ pub fn everything_unfolds_and_folds(name: &str, input: &Mesh) {
     }
     tree.update_mesh(&mut mesh);
     assert_same(&shown(&log, &tree, &mesh), &base, &format!("{name}, all folded"));
-    assert_eq!(tree.displayed_triangles(), base_triangles as u64);
+    assert_eq!(tree.displayed(), base_triangles as u64);
 
     a_walk_shows_what_the_log_says(name, &log, &hierarchy);
 }
 
 /// Random views from around a mesh: slow steps and teleports.
-fn a_walk_shows_what_the_log_says(name: &str, log: &CollapseLog, hierarchy: &Arc<Hierarchy>) {
+fn a_walk_shows_what_the_log_says(name: &str, log: &CollapseLog, hierarchy: &Arc<InMemoryHierarchy>) {
     let (lo, hi) = log.mesh.bounding_box().unwrap();
     let [lo, hi] = [lo, hi].map(|p| DVec3::from(p.map(f64::from)));
     let (center, scale) = ((lo + hi) / 2.0, log.mesh.extent() / 2.0);
@@ -104,12 +104,12 @@ fn a_walk_shows_what_the_log_says(name: &str, log: &CollapseLog, hierarchy: &Arc
         random_step(&mut view, &mut random);
         let report = engine.advance(&[view.with_eye(center + scale * view.eye()).unwrap()]).unwrap();
         engine.assert_well_formed();
-        most = most.max(report.triangles);
+        most = most.max(report.displayed);
         changes += report.unfolds + report.folds;
         if frame % 20 == 19 {
             let mut active = vec![false; log.collapses.len()];
             engine.for_each_active(|node| active[hierarchy.log_number(node) as usize] = true);
-            let found = shown(log, engine.tree(), engine.mesh());
+            let found = shown(log, engine.tree(), engine.sink());
             assert_same(&found, &expected(log, &active), &format!("{name}, frame {frame}"));
         }
     }

@@ -137,7 +137,7 @@ pub fn a_budget_tightened_and_loosened(log: &CollapseLog, budgets: [u64; 6], fra
     let path = around(&log.mesh).unwrap();
     let mut table = Conformance::new(log, settings_for(&path));
     for (round, budget) in budgets.into_iter().enumerate() {
-        table.set_budget(if budget == 0 { Budget::None } else { Budget::Triangles(budget) });
+        table.set_budget(if budget == 0 { Budget::None } else { Budget::Displayed(budget) });
         table.totals.triangles = None;
         for frame in 0..frames {
             // At rest, the budget is what moves the front.

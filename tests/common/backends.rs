@@ -1,25 +1,28 @@
 //! Every backend with every exact strategy, and what each of them must do: follow the brute-force cut.
 //!
-//! A new backend adds a line to [`BACKENDS`].
+//! A new backend adds a line to [`BACKENDS`]; one whose nodes are not the collapses of the log, nor patches of them, is
+//! compared with the brute-force cut of its own nodes.
 
 use std::cell::RefCell;
 use std::rc::Rc;
 use std::sync::Arc;
 
 use foldfront::CollapseLog;
+use foldfront::brute_force::BruteForce;
 use foldfront::budget::Budget;
 use foldfront::cut::Displayed;
 use foldfront::engine::{Engine, FrameReport, Settings};
 use foldfront::oracle::Oracle;
 use foldfront::refine::Strategy;
 use foldfront::vertex_tree::source::MemorySource;
-use foldfront::vertex_tree::{NullSink, Prefetch, VertexTree};
+use foldfront::vertex_tree::{Hierarchy, NullSink, Prefetch, Refine};
 use foldfront::view::View;
-use in_memory::{Hierarchy, InMemoryTree};
+use in_memory::{InMemoryHierarchy, InMemoryTree};
 use meta_node::{MetaNodeFile, MetaNodeTree};
 use mt_partition::{BuildOptions, MtTree};
 
 use super::graph_cut::{self, GraphCut};
+use super::quadtree::PointTree;
 use foldfront::settled::Settled;
 
 use super::detail_block as detail;
@@ -28,9 +31,9 @@ use super::detail_block as detail;
 type Open = fn(&CollapseLog, &[Settings]) -> Vec<Box<dyn Follower>>;
 
 /// The backends and how to open them.
-const BACKENDS: [(&str, Open); 6] = [
+const BACKENDS: [(&str, Open); 7] = [
     ("in-memory", |log, settings| {
-        let hierarchy = Arc::new(Hierarchy::new(log).unwrap());
+        let hierarchy = Arc::new(InMemoryHierarchy::new(log).unwrap());
         follow(settings, || InMemoryTree::new(hierarchy.clone()))
     }),
     ("meta-node", |log, settings| {
@@ -56,13 +59,15 @@ const BACKENDS: [(&str, Open); 6] = [
         let tree = || Settled::new(MtTree::new(file.clone(), mt_partition::Settings::default()).unwrap());
         let engine = |&settings: &Settings| Engine::new(tree(), NullSink, settings).unwrap();
         let cut = Rc::new(RefCell::new(GraphCut::new(&file)));
-        let own = |settings| OwnGraph { engine: engine(settings), cut: cut.clone() };
+        let own = |settings| Own { engine: engine(settings), cut: cut.clone() };
         settings.iter().map(|settings| Box::new(own(settings)) as Box<dyn Follower>).collect()
     }),
     // As in the paper, where frames wait for blocks; and quantised, by an I/O thread that is waited for, with the
     // normal-cone test.
     ("detail-block", |log, settings| detail::follow(log, settings, false, false)),
     ("detail-block quantised, normal cone", |log, settings| detail::follow(log, settings, true, true)),
+    // No mesh: the points of one, and refinement that adds.
+    ("points", |log, settings| follow_own(settings, || PointTree::new(&log.mesh.positions))),
 ];
 
 /// Every exact strategy with every way to fetch ahead.
@@ -86,7 +91,10 @@ pub fn meta_node_bytes(log: &CollapseLog, options: &meta_node::BuildOptions) -> 
     std::fs::read(path).unwrap()
 }
 
-fn follow<T: VertexTree + 'static>(settings: &[Settings], tree: impl Fn() -> T) -> Vec<Box<dyn Follower>> {
+fn follow<T: Refine<NullSink> + 'static>(
+    settings: &[Settings],
+    tree: impl Fn() -> T,
+) -> Vec<Box<dyn Follower>> {
     let engine = |&settings: &Settings| Engine::new(tree(), NullSink, settings).unwrap();
     settings.iter().map(|settings| Box::new(engine(settings)) as Box<dyn Follower>).collect()
 }
@@ -107,7 +115,7 @@ pub trait Follower {
     }
 }
 
-impl<T: VertexTree> Follower for Engine<T, NullSink> {
+impl<T: Refine<NullSink>> Follower for Engine<T, NullSink> {
     fn advance(&mut self, views: &[View]) -> FrameReport {
         self.advance(views).unwrap()
     }
@@ -133,14 +141,60 @@ impl<T: VertexTree> Follower for Engine<T, NullSink> {
     }
 }
 
-/// An engine over a backend whose nodes are not the collapses of the log.
-struct OwnGraph<T> {
-    engine: Engine<T, NullSink>,
-    /// Shared with the other strategies: it is found once for all of them.
-    cut: Rc<RefCell<GraphCut>>,
+/// Engines over a hierarchy of its own, and its brute-force cut.
+fn follow_own<T: Refine<NullSink> + 'static>(
+    settings: &[Settings],
+    tree: impl Fn() -> T,
+) -> Vec<Box<dyn Follower>> {
+    let mut whole = tree();
+    whole.start(&mut NullSink).unwrap();
+    let cut = Rc::new(RefCell::new(BruteForce::new(&mut whole).unwrap()));
+    let engine = |&settings: &Settings| Engine::new(tree(), NullSink, settings).unwrap();
+    let own = |settings| Own { engine: engine(settings), cut: cut.clone() };
+    settings.iter().map(|settings| Box::new(own(settings)) as Box<dyn Follower>).collect()
 }
 
-impl<T: VertexTree> Follower for OwnGraph<T> {
+/// The brute-force cut of a backend whose nodes are not the collapses of the log.
+trait OwnCut<T> {
+    /// Hash, size and what is displayed of the cut for an engine's views.
+    fn cut(&mut self, engine: &Engine<T, NullSink>) -> (u64, u64, u64);
+    /// How the front differs from it, in words.
+    fn difference(&mut self, engine: &Engine<T, NullSink>) -> String;
+}
+
+impl<T: Refine<NullSink>> OwnCut<T> for GraphCut {
+    fn cut(&mut self, engine: &Engine<T, NullSink>) -> (u64, u64, u64) {
+        self.find(engine.settings().criterion, engine.views())
+    }
+
+    fn difference(&mut self, engine: &Engine<T, NullSink>) -> String {
+        self.find(engine.settings().criterion, engine.views());
+        format!("{:?}", GraphCut::difference(self, engine))
+    }
+}
+
+impl<T: Refine<NullSink>> OwnCut<T> for BruteForce {
+    fn cut(&mut self, engine: &Engine<T, NullSink>) -> (u64, u64, u64) {
+        let cut = BruteForce::cut(self, engine.settings(), engine.views());
+        (cut.hash, cut.nodes, cut.displayed)
+    }
+
+    fn difference(&mut self, engine: &Engine<T, NullSink>) -> String {
+        match self.wrong(engine) {
+            0 => "None".to_owned(),
+            wrong => format!("{wrong} nodes are wrong"),
+        }
+    }
+}
+
+/// An engine over such a backend.
+struct Own<T, C> {
+    engine: Engine<T, NullSink>,
+    /// Shared with the other strategies: it is found once for all of them.
+    cut: Rc<RefCell<C>>,
+}
+
+impl<T: Refine<NullSink>, C: OwnCut<T>> Follower for Own<T, C> {
     fn advance(&mut self, views: &[View]) -> FrameReport {
         self.engine.advance(views).unwrap()
     }
@@ -162,13 +216,11 @@ impl<T: VertexTree> Follower for OwnGraph<T> {
     }
 
     fn difference(&self, _: &mut Oracle) -> String {
-        let mut cut = self.cut.borrow_mut();
-        cut.find(self.engine.settings().criterion, self.engine.views());
-        format!("{:?}", cut.difference(&self.engine))
+        self.cut.borrow_mut().difference(&self.engine)
     }
 
     fn own_cut(&mut self) -> Option<(u64, u64, u64)> {
-        Some(self.cut.borrow_mut().find(self.engine.settings().criterion, self.engine.views()))
+        Some(self.cut.borrow_mut().cut(&self.engine))
     }
 }
 
@@ -258,12 +310,12 @@ impl<'a> Conformance<'a> {
         // A budget in triangles steers all alike.
         oracle.cut(settings.criterion, followers[0].1.views());
         let (hash, nodes) = (oracle.cut_hash(), oracle.active_nodes() as u64);
-        let triangles = reports[0].triangles;
+        let triangles = reports[0].displayed;
         let frame = totals.frames;
         for ((backend, follower), report) in followers.iter_mut().zip(&reports) {
             let (hash, nodes, triangles) = follower.own_cut().unwrap_or((hash, nodes, triangles));
             let name = || format!("{backend}, {}, frame {frame}", follower.strategy().name());
-            assert_eq!(report.triangles, triangles, "{}: triangles", name());
+            assert_eq!(report.displayed, triangles, "{}: triangles", name());
             assert_eq!(
                 report.misses + report.forced,
                 0,

@@ -14,7 +14,7 @@ use foldfront::engine::{Engine, FrameReport, Settings};
 use foldfront::oracle::Oracle;
 use foldfront::refine::Strategy;
 use foldfront::vertex_tree::source::MemorySource;
-use foldfront::vertex_tree::{NONE, NullSink, VertexTree};
+use foldfront::vertex_tree::{Hierarchy, NONE, NullSink};
 use foldfront::view::View;
 
 use super::backends::Follower;

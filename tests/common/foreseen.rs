@@ -1,6 +1,6 @@
 //! A backend with everything in memory that writes down what the engine foresees.
 
-use foldfront::vertex_tree::{Bounds, MeshSink, NodeId, PageStats, Step, TreeError, VertexTree};
+use foldfront::vertex_tree::{Bounds, Hierarchy, MeshSink, NodeId, PageStats, Step, TreeError, VertexTree};
 
 /// Passes everything on, and keeps what was named since the frame began.
 pub struct Foreseen<T> {
@@ -18,14 +18,14 @@ impl<T: VertexTree> Foreseen<T> {
     }
 }
 
-impl<T: VertexTree> VertexTree for Foreseen<T> {
+impl<T: VertexTree> Hierarchy for Foreseen<T> {
     const IS_TREE: bool = T::IS_TREE;
 
     fn node_limit(&self) -> u32 {
         self.tree.node_limit()
     }
-    fn displayed_triangles(&self) -> u64 {
-        self.tree.displayed_triangles()
+    fn displayed(&self) -> u64 {
+        self.tree.displayed()
     }
     fn origin(&self) -> [f64; 3] {
         self.tree.origin()
@@ -44,26 +44,6 @@ impl<T: VertexTree> VertexTree for Foreseen<T> {
     }
     fn log_number(&self, node: NodeId) -> u32 {
         self.tree.log_number(node)
-    }
-    fn base_mesh<M: MeshSink>(&mut self, mesh: &mut M) -> Result<(), TreeError> {
-        self.tree.base_mesh(mesh)
-    }
-    fn unfold<M: MeshSink>(&mut self, node: NodeId, mesh: &mut M) -> Result<Step, TreeError> {
-        let step = self.tree.unfold(node, mesh)?;
-        if step == Step::Done {
-            self.changed.push(node);
-        }
-        Ok(step)
-    }
-    fn fold<M: MeshSink>(&mut self, node: NodeId, mesh: &mut M) -> Result<Step, TreeError> {
-        let step = self.tree.fold(node, mesh)?;
-        if step == Step::Done {
-            self.changed.push(node);
-        }
-        Ok(step)
-    }
-    fn update_mesh<M: MeshSink>(&mut self, mesh: &mut M) {
-        self.tree.update_mesh(mesh);
     }
     fn look_ahead(&self) -> u32 {
         self.look_ahead
@@ -88,5 +68,28 @@ impl<T: VertexTree> VertexTree for Foreseen<T> {
     }
     fn end_frame(&mut self) -> Result<PageStats, TreeError> {
         self.tree.end_frame()
+    }
+}
+
+impl<T: VertexTree> VertexTree for Foreseen<T> {
+    fn base_mesh<M: MeshSink>(&mut self, mesh: &mut M) -> Result<(), TreeError> {
+        self.tree.base_mesh(mesh)
+    }
+    fn unfold<M: MeshSink>(&mut self, node: NodeId, mesh: &mut M) -> Result<Step, TreeError> {
+        let step = self.tree.unfold(node, mesh)?;
+        if step == Step::Done {
+            self.changed.push(node);
+        }
+        Ok(step)
+    }
+    fn fold<M: MeshSink>(&mut self, node: NodeId, mesh: &mut M) -> Result<Step, TreeError> {
+        let step = self.tree.fold(node, mesh)?;
+        if step == Step::Done {
+            self.changed.push(node);
+        }
+        Ok(step)
+    }
+    fn update_mesh<M: MeshSink>(&mut self, mesh: &mut M) {
+        self.tree.update_mesh(mesh);
     }
 }

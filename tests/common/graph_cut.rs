@@ -7,7 +7,7 @@ use foldfront::criterion::Criterion;
 use foldfront::engine::Engine;
 use foldfront::front::mix;
 use foldfront::vertex_tree::source::MemorySource;
-use foldfront::vertex_tree::{MeshSink, NodeId, VertexTree};
+use foldfront::vertex_tree::{NodeId, Refine};
 use foldfront::view::View;
 use foldfront::{Bounds, CollapseLog};
 use mt_partition::{BuildOptions, MtFile};
@@ -79,10 +79,7 @@ impl GraphCut {
     }
 
     /// The first nodes that an engine has otherwise, with whether the cut has them active, and how many there are.
-    pub fn difference<T: VertexTree, M: MeshSink>(
-        &self,
-        engine: &Engine<T, M>,
-    ) -> Option<(Vec<(usize, bool)>, usize)> {
+    pub fn difference<T: Refine<S>, S>(&self, engine: &Engine<T, S>) -> Option<(Vec<(usize, bool)>, usize)> {
         let mut differs = self.active.clone();
         engine.for_each_active(|node| differs[node.index()] = !differs[node.index()]);
         let nodes: Vec<usize> = (0..differs.len()).filter(|&n| differs[n]).collect();

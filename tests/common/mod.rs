@@ -8,6 +8,8 @@ pub mod detail_block;
 pub mod foreseen;
 pub mod graph_cut;
 pub mod meshes;
+#[path = "../../examples/points/quadtree.rs"]
+pub mod quadtree;
 pub mod sink;
 pub mod trajectories;
 

@@ -7,7 +7,7 @@ use std::rc::Rc;
 
 use foldfront::Bounds;
 use foldfront::criterion::Criterion;
-use foldfront::vertex_tree::{MeshSink, NodeId, PageStats, Step, TreeError, VertexTree};
+use foldfront::vertex_tree::{Hierarchy, MeshSink, NodeId, PageStats, Step, TreeError, VertexTree};
 use foldfront::view::View;
 use glam::DVec3;
 
@@ -242,12 +242,12 @@ impl GraphTree {
     }
 }
 
-impl VertexTree for GraphTree {
+impl Hierarchy for GraphTree {
     fn node_limit(&self) -> u32 {
         self.graph.bounds.len() as u32
     }
 
-    fn displayed_triangles(&self) -> u64 {
+    fn displayed(&self) -> u64 {
         self.log.borrow().active.iter().filter(|&&active| active).count() as u64
     }
 
@@ -274,6 +274,39 @@ impl VertexTree for GraphTree {
         self.node_limit() - 1 - node.0
     }
 
+    fn peek(&self, node: NodeId, children: &mut Vec<(NodeId, Bounds)>) -> bool {
+        let below = &self.graph.children[node.index()];
+        children.extend(below.iter().map(|&child| (child, self.graph.bounds[child.index()])));
+        true
+    }
+
+    fn begin_frame(&mut self, arrived: &mut Vec<NodeId>) -> Result<(), TreeError> {
+        self.frame += 1;
+        self.may_fail(Call::Begin)?;
+        for (n, arriving) in self.arriving.iter_mut().enumerate() {
+            if arriving.is_some_and(|at| at <= self.frame) {
+                *arriving = None;
+                self.resident_until[n] = self.frame + STAYS;
+                self.log.borrow_mut().refused.remove(&(n as u32));
+                arrived.push(NodeId(n as u32));
+            }
+        }
+        Ok(())
+    }
+
+    fn give_up(&mut self, node: NodeId) {
+        self.log.borrow_mut().refused.remove(&node.0);
+    }
+
+    fn end_frame(&mut self) -> Result<PageStats, TreeError> {
+        let refused = self.log.borrow().refused.len() as u64;
+        self.log.borrow_mut().refusals += refused;
+        self.may_fail(Call::End)?;
+        Ok(PageStats::default())
+    }
+}
+
+impl VertexTree for GraphTree {
     fn base_mesh<M: MeshSink>(&mut self, _: &mut M) -> Result<(), TreeError> {
         Ok(())
     }
@@ -307,36 +340,5 @@ impl VertexTree for GraphTree {
         }
         self.log.borrow_mut().active[node.index()] = false;
         Ok(Step::Done)
-    }
-
-    fn peek(&self, node: NodeId, children: &mut Vec<(NodeId, Bounds)>) -> bool {
-        let below = &self.graph.children[node.index()];
-        children.extend(below.iter().map(|&child| (child, self.graph.bounds[child.index()])));
-        true
-    }
-
-    fn begin_frame(&mut self, arrived: &mut Vec<NodeId>) -> Result<(), TreeError> {
-        self.frame += 1;
-        self.may_fail(Call::Begin)?;
-        for (n, arriving) in self.arriving.iter_mut().enumerate() {
-            if arriving.is_some_and(|at| at <= self.frame) {
-                *arriving = None;
-                self.resident_until[n] = self.frame + STAYS;
-                self.log.borrow_mut().refused.remove(&(n as u32));
-                arrived.push(NodeId(n as u32));
-            }
-        }
-        Ok(())
-    }
-
-    fn give_up(&mut self, node: NodeId) {
-        self.log.borrow_mut().refused.remove(&node.0);
-    }
-
-    fn end_frame(&mut self) -> Result<PageStats, TreeError> {
-        let refused = self.log.borrow().refused.len() as u64;
-        self.log.borrow_mut().refusals += refused;
-        self.may_fail(Call::End)?;
-        Ok(PageStats::default())
     }
 }

@@ -2,7 +2,7 @@
 
 use foldfront::engine::Engine;
 use foldfront::oracle::Oracle;
-use foldfront::vertex_tree::{NullSink, VertexTree};
+use foldfront::vertex_tree::{Hierarchy, NullSink};
 use meta_node::{Dependencies, MetaNodeTree};
 
 use crate::common::backends::meta_node_file;

@@ -19,9 +19,9 @@ use foldfront::oracle::Oracle;
 use foldfront::refine::Strategy;
 use foldfront::simplify;
 use foldfront::vertex_tree::source::{Faults, Faulty, MemorySource};
-use foldfront::vertex_tree::{CollapseLog, MeshSink, NullSink, VertexTree};
+use foldfront::vertex_tree::{CollapseLog, Hierarchy, MeshSink, NullSink};
 use foldfront::view::View;
-use in_memory::{Hierarchy, InMemoryTree};
+use in_memory::{InMemoryHierarchy, InMemoryTree};
 use meta_node::{Dependencies, InUse, MetaNodeFile, MetaNodeTree};
 use needs::{EXACT, PAGES};
 
@@ -81,7 +81,7 @@ fn a_camera_that_stops_always_gets_its_cut() {
                 engine.assert_well_formed();
                 assert_eq!(oracle.compare(&engine), None, "{}, round {round}", strategy.name());
                 let displayed = Displayed::new(&log, oracle.active()).triangles.len() as u64;
-                assert_eq!(engine.tree().displayed_triangles(), displayed);
+                assert_eq!(engine.tree().displayed(), displayed);
             }
             assert!(misses > 1000, "{misses}");
         }
@@ -180,7 +180,7 @@ fn places(mesh: &StrictMesh) -> Vec<[[u32; 3]; 3]> {
 fn the_displayed_mesh_is_that_of_the_in_memory_tree() {
     let log = grid(50);
     let file = meta_node_file(&log, &PAGES);
-    let hierarchy = Arc::new(Hierarchy::new(&log).unwrap());
+    let hierarchy = Arc::new(InMemoryHierarchy::new(&log).unwrap());
     for (dependencies, holders) in
         [(Dependencies::Off, 4), (Dependencies::Off, 12), (Dependencies::Force, 1_000_000)]
     {
@@ -202,10 +202,10 @@ fn the_displayed_mesh_is_that_of_the_in_memory_tree() {
             }
             settle(&mut engine, &[view]);
             if engine.front().cut_hash() == reference.front().cut_hash() {
-                assert_eq!(places(engine.mesh()), places(reference.mesh()));
+                assert_eq!(places(engine.sink()), places(reference.sink()));
                 equal += 1;
             }
-            assert_eq!(engine.mesh().triangles.len() as u64, engine.tree().displayed_triangles());
+            assert_eq!(engine.sink().triangles.len() as u64, engine.tree().displayed());
         }
         assert!(equal == 60 || dependencies == Dependencies::Force, "{equal}");
     }

@@ -8,7 +8,7 @@ use foldfront::engine::{Engine, FrameReport};
 use foldfront::oracle::Oracle;
 use foldfront::refine::Strategy;
 use foldfront::vertex_tree::simulated::Simulated;
-use foldfront::vertex_tree::{NodeId, NullSink, Prefetch, VertexTree};
+use foldfront::vertex_tree::{Hierarchy, NodeId, NullSink, Prefetch};
 use foldfront::view::View;
 use meta_node::{InUse, Io, MetaNodeFile, MetaNodeTree};
 

@@ -5,7 +5,7 @@
 use std::sync::Arc;
 use std::time::Duration;
 
-use foldfront::VertexTree;
+use foldfront::Hierarchy;
 use foldfront::engine::{Engine, FrameReport, Settings};
 use foldfront::refine::Strategy;
 use foldfront::vertex_tree::simulated::Simulated;

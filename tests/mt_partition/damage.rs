@@ -2,7 +2,7 @@
 
 use std::sync::Arc;
 
-use foldfront::VertexTree;
+use foldfront::Hierarchy;
 use foldfront::vertex_tree::source::MemorySource;
 use mt_partition::{BuildOptions, MAGIC, MtError, MtFile};
 
@@ -57,7 +57,7 @@ fn any_flipped_bit_is_found() {
             engine.tree_mut().settle().unwrap();
         }
         assert!(faults > 0, "byte {at}");
-        let displayed = engine.mesh().triangles.len();
+        let displayed = engine.sink().triangles.len();
         assert!(displayed < 128, "byte {at}: the damaged node is displayed");
         coarse += 1;
     }

@@ -6,7 +6,7 @@ use std::time::{Duration, Instant};
 use foldfront::engine::Engine;
 use foldfront::vertex_tree::source::{Counted, Faults, Faulty, MemorySource, PageSource};
 use foldfront::vertex_tree::{MeshSink, NullSink};
-use foldfront::{VertexTree, engine::Settings};
+use foldfront::{Hierarchy, engine::Settings};
 use mt_partition::{BuildOptions, CacheMode, Memory, MtError, MtFile, MtTree, Reader};
 
 use crate::common::graph_cut::GraphCut;
@@ -66,8 +66,8 @@ fn the_least_memory_is_enough() {
                 }
                 let what = format!("{}, {times} times the least memory, round {round}", mode.name());
                 assert_converges(&mut engine, &mut cut, &views, &what);
-                let triangles = engine.tree().displayed_triangles();
-                assert_eq!(triangles, engine.mesh().triangles.len() as u64);
+                let triangles = engine.tree().displayed();
+                assert_eq!(triangles, engine.sink().triangles.len() as u64);
             }
             drop(engine);
             assert_eq!(memory.used(), 0, "{}: all is given back", mode.name());

@@ -5,7 +5,7 @@ use std::sync::Arc;
 use std::sync::atomic::AtomicBool;
 
 use foldfront::vertex_tree::source::MemorySource;
-use foldfront::{CollapseLog, VertexTree};
+use foldfront::{CollapseLog, Hierarchy};
 use mt_partition::{BuildOptions, CacheMode, Memory, MtError, MtFile, Workspace, WriteReport, write_within};
 
 use crate::common::data;

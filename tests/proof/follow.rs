@@ -9,7 +9,7 @@ use foldfront::vertex_tree::NullSink;
 use foldfront::view::{Camera, View};
 use foldfront::{Bounds, Collapse, CollapseLog, Mesh};
 use glam::DVec3;
-use in_memory::{Hierarchy, InMemoryTree};
+use in_memory::{InMemoryHierarchy, InMemoryTree};
 
 use crate::common::{Random, bumpy_grid};
 
@@ -54,7 +54,7 @@ pub struct Party {
 
 impl Party {
     pub fn new(log: &CollapseLog, settings: Settings) -> Self {
-        let hierarchy = Arc::new(Hierarchy::new(log).unwrap());
+        let hierarchy = Arc::new(InMemoryHierarchy::new(log).unwrap());
         let engine = |strategy: Strategy| {
             let tree = InMemoryTree::new(hierarchy.clone());
             Engine::new(tree, NullSink, Settings { strategy, ..settings }).unwrap()

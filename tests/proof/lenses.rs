@@ -114,7 +114,7 @@ fn flat_ground_at_the_finest_tolerance() {
     for is_flat in [true, false] {
         let log = scaled_log(1.0, is_flat, &mut random);
         for criterion in [Criterion::ScreenError, Criterion::SphereSize] {
-            for budget in [Budget::None, Budget::Triangles(60)] {
+            for budget in [Budget::None, Budget::Displayed(60)] {
                 let settings = Settings { criterion, budget, rho: 0.01, ..Settings::default() };
                 let mut party = Party::new(&log, settings);
                 let theta = 1.2e-308;

@@ -9,7 +9,7 @@ use foldfront::refine::Strategy;
 use foldfront::vertex_tree::{NullSink, TreeError};
 use foldfront::view::{Camera, View, ViewError};
 use glam::{DQuat, DVec3};
-use in_memory::{Hierarchy, InMemoryTree};
+use in_memory::{InMemoryHierarchy, InMemoryTree};
 
 use crate::common::Random;
 use crate::follow::{Party, look, scaled_log};
@@ -78,7 +78,7 @@ fn no_declared_speed_costs_tests_and_no_cut() {
         [(0.0, 0.02), (0.02, 0.0), (0.0, 0.0), (-1.0, f64::NAN), (f64::INFINITY, f64::INFINITY)]
     {
         let mut oracle = Oracle::new(&log).unwrap();
-        let hierarchy = Arc::new(Hierarchy::new(&log).unwrap());
+        let hierarchy = Arc::new(InMemoryHierarchy::new(&log).unwrap());
         let settings = Settings { rho, omega, ..Settings::default() };
         let engine = |strategy| {
             let tree = InMemoryTree::new(hierarchy.clone());
@@ -117,13 +117,13 @@ fn a_tree_that_is_nowhere_is_refused() {
     let mut log = scaled_log(1.0, false, &mut random);
     for x in [f64::NAN, f64::INFINITY, -1e151] {
         log.mesh.georeference.origin = [0.0, x, 0.0];
-        let tree = InMemoryTree::new(Arc::new(Hierarchy::new(&log).unwrap()));
+        let tree = InMemoryTree::new(Arc::new(InMemoryHierarchy::new(&log).unwrap()));
         let error = Engine::new(tree, NullSink, Settings::default()).err().unwrap();
         assert!(matches!(error, TreeError::Origin { .. }), "{error}");
     }
     // As far as can be, on both sides.
     log.mesh.georeference.origin = [0.0, -View::FARTHEST, 0.0];
-    let tree = InMemoryTree::new(Arc::new(Hierarchy::new(&log).unwrap()));
+    let tree = InMemoryTree::new(Arc::new(InMemoryHierarchy::new(&log).unwrap()));
     let mut engine = Engine::new(tree, NullSink, Settings::default()).unwrap();
     let view = look(1.0, 1.0, 0.02, &mut random).with_eye(DVec3::Y * View::FARTHEST).unwrap();
     assert_eq!(engine.advance(&[view]).unwrap().active_nodes, 0);

@@ -8,7 +8,7 @@ use foldfront::engine::{Engine, Settings};
 use foldfront::oracle::Oracle;
 use foldfront::refine::Strategy;
 use foldfront::settled::Settled;
-use foldfront::vertex_tree::{NullSink, VertexTree};
+use foldfront::vertex_tree::{NullSink, Refine, VertexTree};
 use foldfront::view::{Camera, View, theta_of_pixels};
 use foldfront::{CollapseLog, Mesh};
 use glam::DVec3;
@@ -47,7 +47,7 @@ fn displayed(mesh: &StrictMesh) -> Facets {
 /// What a tree shows when everything is unfolded.
 pub fn unfolded<T: VertexTree>(open: impl Fn() -> Result<T, Fault>) -> Result<Facets, Fault> {
     let (mut tree, mut mesh) = (Settled::new(open()?), StrictMesh::default());
-    tree.base_mesh(&mut mesh).map_err(wrong)?;
+    tree.start(&mut mesh).map_err(wrong)?;
     unfold_all(&mut tree, &mut mesh, |_, _| ControlFlow::Continue(())).map_err(wrong)?;
     Ok(displayed(&mesh))
 }
@@ -68,12 +68,15 @@ impl Truth {
 
     pub fn nodes<T: VertexTree>(open: impl Fn() -> Result<T, Fault>) -> Result<Self, Fault> {
         let mut tree = Settled::new(open()?);
-        tree.base_mesh(&mut NullSink).map_err(wrong)?;
+        tree.start(&mut NullSink).map_err(wrong)?;
         BruteForce::new(&mut tree).map(Self::Nodes).map_err(wrong)
     }
 
     /// How an engine's cut differs, and what it should show, if that is known.
-    fn of<T: VertexTree>(&mut self, engine: &Engine<T, StrictMesh>) -> (Option<String>, Option<Facets>) {
+    fn of<T: Refine<StrictMesh>>(
+        &mut self,
+        engine: &Engine<T, StrictMesh>,
+    ) -> (Option<String>, Option<Facets>) {
         match self {
             Self::Log(log, oracle) => {
                 let difference = oracle.compare(engine).map(|difference| format!("{difference:?}"));
@@ -130,8 +133,8 @@ fn walk<T: VertexTree>(
         ensure(put_off == 0, || place(format!("{put_off} changes put off")))?;
         let (difference, expected) = truth.of(&engine);
         ensure(difference.is_none(), || place(format!("cut: {}", difference.unwrap_or_default())))?;
-        let shown = displayed(engine.mesh());
-        ensure(shown.len() as u64 == report.triangles, || place("another number of triangles".to_owned()))?;
+        let shown = displayed(engine.sink());
+        ensure(shown.len() as u64 == report.displayed, || place("another number of triangles".to_owned()))?;
         ensure(expected.is_none_or(|expected| expected == shown), || {
             place("what is displayed is not what the cut shows".to_owned())
         })?;

@@ -83,7 +83,7 @@ impl Arrangement {
     }
 
     /// The log that the file stands for: the manifold mesh, and the collapses that were made on it with their bounds as
-    /// stored, in descending order of node numbers. [`log_number`](vertex_tree::VertexTree::log_number) of the tree counts
+    /// stored, in descending order of node numbers. [`log_number`](vertex_tree::Hierarchy::log_number) of the tree counts
     /// in it. Positions are those stored. An oracle made from it knows what the tree's cut should be, as long as bounds are
     /// nested over needs.
     #[must_use]

@@ -6,7 +6,7 @@
 //! # use std::sync::Arc;
 //! # use detail_block::{BuildOptions, Settings, XfmFile, XfmTree};
 //! # use vertex_tree::source::FileSource;
-//! # use vertex_tree::{CollapseLog, NullSink, VertexTree};
+//! # use vertex_tree::{CollapseLog, NullSink, Hierarchy, VertexTree};
 //! # fn main() -> Result<(), Box<dyn std::error::Error>> {
 //! # let (log, folder) = (CollapseLog::default(), tempfile::tempdir()?);
 //! # let path = &folder.path().join("empty.xfm");

@@ -15,7 +15,7 @@
 //! As printed, the traversal loads the child blocks that it comes upon "and continues": the frame waits for the disk. Here a
 //! change that wants a block is refused, and the block is asked for, so that no frame waits; that is the only difference between
 //! the paper's scheme and [`Prefetch::Paper`](vertex_tree::Prefetch::Paper). Whoever wants it as printed waits for
-//! [`settle`](vertex_tree::VertexTree::settle) and asks again, as foldfront's `Settled` does (`--prefetch blocking`);
+//! [`settle`](vertex_tree::Hierarchy::settle) and asks again, as foldfront's `Settled` does (`--prefetch blocking`);
 //! [`Io::Blocking`](crate::Io::Blocking) reads within the change itself.
 //!
 //! Blocks of active nodes are never removed, so whatever is active can be asked about. A root of a block that is in play

@@ -14,7 +14,7 @@ use std::sync::Arc;
 use std::time::Duration;
 
 use vertex_tree::{
-    Bounds, MeshSink, NONE, NodeId, NormalCone, PageStats, Prefetch, Step, TreeError, VertexTree,
+    Bounds, Hierarchy, MeshSink, NONE, NodeId, NormalCone, PageStats, Prefetch, Step, TreeError, VertexTree,
 };
 
 use crate::block::ACTIVE;
@@ -142,7 +142,7 @@ fn brought(adjacent: [u32; 4]) -> u64 {
     sides(adjacent).into_iter().map(u64::from).sum()
 }
 
-impl VertexTree for XfmTree {
+impl Hierarchy for XfmTree {
     const IS_TREE: bool = true;
     const HAS_CONES: bool = true;
 
@@ -150,7 +150,7 @@ impl VertexTree for XfmTree {
         (self.paging.file.header().blocks as u32) << self.paging.file.levels().get()
     }
 
-    fn displayed_triangles(&self) -> u64 {
+    fn displayed(&self) -> u64 {
         self.displayed
     }
 
@@ -221,6 +221,52 @@ impl VertexTree for XfmTree {
         file.header().nodes as u32 - 1 - file.nodes_before(number) - index as u32
     }
 
+    fn look_ahead(&self) -> u32 {
+        if self.foresees { self.paging.look_ahead() } else { 0 }
+    }
+
+    fn will_need(&mut self, node: NodeId, frames: u32) {
+        if self.foresees {
+            self.paging.foresee(node, frames);
+        }
+    }
+
+    fn peek(&self, node: NodeId, children: &mut Vec<(NodeId, Bounds)>) -> bool {
+        self.paging.peek(node, children)
+    }
+
+    fn pass(&mut self, time: Duration) -> Result<(), TreeError> {
+        self.paging.pass(time);
+        Ok(())
+    }
+
+    fn begin_frame(&mut self, arrived: &mut Vec<NodeId>) -> Result<(), TreeError> {
+        self.paging.begin_frame(arrived)
+    }
+
+    fn give_up(&mut self, node: NodeId) {
+        self.paging.give_up(node);
+    }
+
+    fn settle(&mut self) -> Result<Duration, TreeError> {
+        Ok(self.paging.settle())
+    }
+
+    #[track_caller]
+    fn assert_well_formed(&self) {
+        // The type's own, which goes before this one.
+        XfmTree::assert_well_formed(self);
+    }
+
+    fn end_frame(&mut self) -> Result<PageStats, TreeError> {
+        if self.foresees {
+            self.paging.ask_for_foreseen();
+        }
+        Ok(self.paging.end_frame())
+    }
+}
+
+impl VertexTree for XfmTree {
     fn base_mesh<M: MeshSink>(&mut self, mesh: &mut M) -> Result<(), TreeError> {
         let file = &self.paging.file;
         self.displayed = file.initial_faces().triangles.len() as u64;
@@ -310,49 +356,5 @@ impl VertexTree for XfmTree {
         self.paging.leave_play(node);
         self.displayed -= brought(adjacent);
         Ok(Step::Done)
-    }
-
-    fn look_ahead(&self) -> u32 {
-        if self.foresees { self.paging.look_ahead() } else { 0 }
-    }
-
-    fn will_need(&mut self, node: NodeId, frames: u32) {
-        if self.foresees {
-            self.paging.foresee(node, frames);
-        }
-    }
-
-    fn peek(&self, node: NodeId, children: &mut Vec<(NodeId, Bounds)>) -> bool {
-        self.paging.peek(node, children)
-    }
-
-    fn pass(&mut self, time: Duration) -> Result<(), TreeError> {
-        self.paging.pass(time);
-        Ok(())
-    }
-
-    fn begin_frame(&mut self, arrived: &mut Vec<NodeId>) -> Result<(), TreeError> {
-        self.paging.begin_frame(arrived)
-    }
-
-    fn give_up(&mut self, node: NodeId) {
-        self.paging.give_up(node);
-    }
-
-    fn settle(&mut self) -> Result<Duration, TreeError> {
-        Ok(self.paging.settle())
-    }
-
-    #[track_caller]
-    fn assert_well_formed(&self) {
-        // The type's own, which goes before this one.
-        XfmTree::assert_well_formed(self);
-    }
-
-    fn end_frame(&mut self) -> Result<PageStats, TreeError> {
-        if self.foresees {
-            self.paging.ask_for_foreseen();
-        }
-        Ok(self.paging.end_frame())
     }
 }

@@ -39,7 +39,7 @@ const MOST_TRIANGLES: usize = 1 << (32 - COUNT_BITS);
 
 /// A collapse log arranged for refinement. Shared, unchanging: several trees can show it at once.
 #[derive(Clone, Debug)]
-pub struct Hierarchy {
+pub struct InMemoryHierarchy {
     pub(crate) nodes: Vec<Node>,
     /// For each node, its parent, or [`NONE`] for a root.
     pub(crate) parents: Vec<u32>,
@@ -130,7 +130,7 @@ fn order(log: &CollapseLog, leaves: &Leaves) -> Vec<u32> {
     order.into_iter().map(|(.., n)| n).collect()
 }
 
-impl Hierarchy {
+impl InMemoryHierarchy {
     /// Arranges a log.
     ///
     /// # Errors

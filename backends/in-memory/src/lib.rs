@@ -1,12 +1,12 @@
 //! The reference backend: the whole hierarchy resident, nothing clever.
 //!
 //! ```
-//! # use vertex_tree::{CollapseLog, NullSink, VertexTree};
-//! # use in_memory::{Hierarchy, InMemoryTree};
+//! # use vertex_tree::{CollapseLog, NullSink, Hierarchy, VertexTree};
+//! # use in_memory::{InMemoryHierarchy, InMemoryTree};
 //! # use std::sync::Arc;
 //! # fn main() -> Result<(), Box<dyn std::error::Error>> {
 //! # let log = CollapseLog::default();
-//! let hierarchy = Arc::new(Hierarchy::new(&log)?); // once a model
+//! let hierarchy = Arc::new(InMemoryHierarchy::new(&log)?); // once a model
 //! let mut tree = InMemoryTree::new(hierarchy); // once a viewer
 //! tree.base_mesh(&mut NullSink)?;
 //! # Ok(())
@@ -16,5 +16,5 @@
 mod hierarchy;
 mod tree;
 
-pub use hierarchy::Hierarchy;
+pub use hierarchy::InMemoryHierarchy;
 pub use tree::InMemoryTree;

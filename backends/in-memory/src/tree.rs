@@ -3,11 +3,11 @@
 use std::sync::Arc;
 
 use vertex_tree::{
-    Bounds, LeafTriangle, MeshSink, NONE, NodeId, PageStats, StarMesh, Step, TreeError, TriangleId, VertexId,
-    VertexTree, prefetch,
+    Bounds, Hierarchy, LeafTriangle, MeshSink, NONE, NodeId, PageStats, StarMesh, Step, TreeError,
+    TriangleId, VertexId, VertexTree, prefetch,
 };
 
-use crate::Hierarchy;
+use crate::InMemoryHierarchy;
 use crate::hierarchy::Node;
 
 /// A hierarchy and the state of one front through it.
@@ -16,7 +16,7 @@ use crate::hierarchy::Node;
 /// the criterion asks for is one that the simplification went through.
 #[derive(Clone, Debug)]
 pub struct InMemoryTree {
-    hierarchy: Arc<Hierarchy>,
+    hierarchy: Arc<InMemoryHierarchy>,
     /// Kept only for a sink that wants the mesh.
     mesh: Option<StarMesh>,
     displayed: u64,
@@ -25,13 +25,13 @@ pub struct InMemoryTree {
 impl InMemoryTree {
     /// A tree with every node folded.
     #[must_use]
-    pub fn new(hierarchy: Arc<Hierarchy>) -> Self {
+    pub fn new(hierarchy: Arc<InMemoryHierarchy>) -> Self {
         Self { hierarchy, mesh: None, displayed: 0 }
     }
 
     /// The hierarchy that the tree shows.
     #[must_use]
-    pub fn hierarchy(&self) -> &Arc<Hierarchy> {
+    pub fn hierarchy(&self) -> &Arc<InMemoryHierarchy> {
         &self.hierarchy
     }
 
@@ -53,7 +53,7 @@ impl InMemoryTree {
     }
 }
 
-impl VertexTree for InMemoryTree {
+impl Hierarchy for InMemoryTree {
     const IS_TREE: bool = true;
     const PREPARATION: usize = 2;
 
@@ -61,7 +61,7 @@ impl VertexTree for InMemoryTree {
         self.hierarchy.nodes.len() as u32
     }
 
-    fn displayed_triangles(&self) -> u64 {
+    fn displayed(&self) -> u64 {
         self.displayed
     }
 
@@ -106,6 +106,35 @@ impl VertexTree for InMemoryTree {
         self.node(node).log_number
     }
 
+    #[inline(always)]
+    fn prepare(&self, node: NodeId, step: usize) {
+        let h = &*self.hierarchy;
+        if step == 0 {
+            prefetch(&h.nodes, node.index());
+        } else if self.mesh.is_some() {
+            prefetch(&h.positions, node.index());
+            prefetch(&h.triangles, h.first_brought(node.index()) as usize);
+        }
+    }
+
+    #[track_caller]
+    fn assert_well_formed(&self) {
+        if let Some(stars) = &self.mesh {
+            stars.assert_well_formed();
+            assert_eq!(stars.displayed() as u64, self.displayed, "triangles displayed");
+        }
+    }
+
+    fn end_frame(&mut self) -> Result<PageStats, TreeError> {
+        let h = &self.hierarchy;
+        let resident_bytes = (h.nodes.len() * (size_of::<Node>() + 16)
+            + h.input_vertex.len() * 4
+            + h.triangles.len() * 16) as u64;
+        Ok(PageStats { resident_bytes, ..PageStats::default() })
+    }
+}
+
+impl VertexTree for InMemoryTree {
     fn base_mesh<M: MeshSink>(&mut self, mesh: &mut M) -> Result<(), TreeError> {
         let h = &self.hierarchy;
         // A triangle with a doubled corner has no node that brings it and is no base triangle either.
@@ -153,32 +182,5 @@ impl VertexTree for InMemoryTree {
         if let Some(stars) = &mut self.mesh {
             stars.update(mesh);
         }
-    }
-
-    #[inline(always)]
-    fn prepare(&self, node: NodeId, step: usize) {
-        let h = &*self.hierarchy;
-        if step == 0 {
-            prefetch(&h.nodes, node.index());
-        } else if self.mesh.is_some() {
-            prefetch(&h.positions, node.index());
-            prefetch(&h.triangles, h.first_brought(node.index()) as usize);
-        }
-    }
-
-    #[track_caller]
-    fn assert_well_formed(&self) {
-        if let Some(stars) = &self.mesh {
-            stars.assert_well_formed();
-            assert_eq!(stars.displayed() as u64, self.displayed, "triangles displayed");
-        }
-    }
-
-    fn end_frame(&mut self) -> Result<PageStats, TreeError> {
-        let h = &self.hierarchy;
-        let resident_bytes = (h.nodes.len() * (size_of::<Node>() + 16)
-            + h.input_vertex.len() * 4
-            + h.triangles.len() * 16) as u64;
-        Ok(PageStats { resident_bytes, ..PageStats::default() })
     }
 }

@@ -8,7 +8,7 @@
 //! ```no_run
 //! # use std::{path::Path, sync::Arc};
 //! # use meta_node::{BuildOptions, MetaNodeFile, MetaNodeTree, Settings};
-//! # use vertex_tree::{CollapseLog, NullSink, VertexTree, source::FileSource};
+//! # use vertex_tree::{CollapseLog, NullSink, Hierarchy, VertexTree, source::FileSource};
 //! # fn main() -> Result<(), Box<dyn std::error::Error>> {
 //! # let log = CollapseLog::default();
 //! let path = Path::new("dragon.fold");

@@ -53,7 +53,7 @@ pub enum Io {
     /// A thread of its own, as fast as the source is.
     #[default]
     Thread,
-    /// Nobody before its time: the caller, in [`VertexTree::pass`](vertex_tree::VertexTree::pass), on virtual time. There
+    /// Nobody before its time: the caller, in [`Hierarchy::pass`](vertex_tree::Hierarchy::pass), on virtual time. There
     /// is no thread. The same replay has the same misses.
     Simulated(Simulated),
 }

@@ -5,7 +5,9 @@ use std::ops::Range;
 use std::sync::Arc;
 use std::time::Duration;
 
-use vertex_tree::{Bounds, LeafTriangle, MeshSink, NodeId, PageStats, StarMesh, Step, TreeError, VertexTree};
+use vertex_tree::{
+    Bounds, Hierarchy, LeafTriangle, MeshSink, NodeId, PageStats, StarMesh, Step, TreeError, VertexTree,
+};
 
 use crate::dependencies::{Half, Rules};
 use crate::error::MetaNodeError;
@@ -73,7 +75,7 @@ impl MetaNodeTree {
         self.pager.set_page_memory(bytes)
     }
 
-    /// Asks for every page for which there is room. Once these have [come](VertexTree::settle), a tree with memory
+    /// Asks for every page for which there is room. Once these have [come](Hierarchy::settle), a tree with memory
     /// for everything misses nothing.
     pub fn load_all(&mut self) {
         self.pager.load_all();
@@ -191,7 +193,7 @@ impl MetaNodeTree {
     }
 }
 
-impl VertexTree for MetaNodeTree {
+impl Hierarchy for MetaNodeTree {
     const IS_TREE: bool = true;
     const PREPARATION: usize = 4;
 
@@ -199,7 +201,7 @@ impl VertexTree for MetaNodeTree {
         self.pager.file.header.pages << self.slot_bits
     }
 
-    fn displayed_triangles(&self) -> u64 {
+    fn displayed(&self) -> u64 {
         self.displayed
     }
 
@@ -266,6 +268,94 @@ impl VertexTree for MetaNodeTree {
         self.look(node, |_, node| node.log_number()).unwrap_or(vertex_tree::NONE)
     }
 
+    #[inline(always)]
+    fn prepare(&self, node: NodeId, step: usize) {
+        let (page, slot) = self.place(node);
+        if step == 0 {
+            self.pager.prefetch_table(page);
+            return;
+        }
+        let Some(holder) = self.pager.find(page) else { return };
+        match step {
+            1 => self.pager.prefetch_holder(holder),
+            2 => self.pager.page(holder).prefetch(slot),
+            _ => {
+                let page = self.pager.page(holder);
+                page.prefetch_children(slot);
+                if self.mesh.is_some() {
+                    page.prefetch_brought(slot);
+                }
+            }
+        }
+    }
+
+    fn look_ahead(&self) -> u32 {
+        self.pager.frames_ahead()
+    }
+
+    fn will_need(&mut self, node: NodeId, frames: u32) {
+        // Unfolding and folding both take the node's own page and no other.
+        self.pager.foresee(self.place(node).0, frames);
+    }
+
+    fn peek(&self, node: NodeId, children: &mut Vec<(NodeId, Bounds)>) -> bool {
+        let is_here = self.is_resident(node);
+        if is_here {
+            children.extend(self.children_and_bounds(node));
+        }
+        is_here
+    }
+
+    fn pass(&mut self, time: Duration) -> Result<(), TreeError> {
+        self.pager.pass(time);
+        Ok(())
+    }
+
+    fn begin_frame(&mut self, arrived: &mut Vec<NodeId>) -> Result<(), TreeError> {
+        if let Some(rules) = &mut self.rules {
+            rules.begin_frame();
+        }
+        arrived.append(&mut self.again);
+        self.pager.begin_frame();
+        let mut news = std::mem::take(&mut self.pager.news);
+        for page in news.drain(..).filter(|&page| !self.pager.is_under_way(page)) {
+            let nodes = self.nodes_of(page);
+            while let Some(&node) = self.refused.range(nodes.clone()).next() {
+                self.refused.remove(&node);
+                arrived.push(node);
+            }
+        }
+        self.pager.news = news;
+        Ok(())
+    }
+
+    fn give_up(&mut self, node: NodeId) {
+        self.again.retain(|&other| other != node);
+        let (page, _) = self.place(node);
+        if self.refused.remove(&node) && self.refused.range(self.nodes_of(page)).next().is_none() {
+            self.pager.demote(page);
+        }
+    }
+
+    fn settle(&mut self) -> Result<Duration, TreeError> {
+        Ok(self.pager.settle())
+    }
+
+    #[track_caller]
+    fn assert_well_formed(&self) {
+        if let Some(stars) = &self.mesh {
+            stars.assert_well_formed();
+            assert_eq!(stars.displayed() as u64, self.displayed, "triangles displayed");
+        }
+        self.pager.assert_well_formed();
+    }
+
+    fn end_frame(&mut self) -> Result<PageStats, TreeError> {
+        Ok(self.pager.end_frame())
+    }
+}
+
+impl VertexTree for MetaNodeTree {
     fn base_mesh<M: MeshSink>(&mut self, mesh: &mut M) -> Result<(), TreeError> {
         let file = self.pager.file.clone();
         self.displayed = file.base_triangles.len() as u64;
@@ -368,92 +458,6 @@ impl VertexTree for MetaNodeTree {
         if let Some(stars) = &mut self.mesh {
             stars.update(mesh);
         }
-    }
-
-    #[inline(always)]
-    fn prepare(&self, node: NodeId, step: usize) {
-        let (page, slot) = self.place(node);
-        if step == 0 {
-            self.pager.prefetch_table(page);
-            return;
-        }
-        let Some(holder) = self.pager.find(page) else { return };
-        match step {
-            1 => self.pager.prefetch_holder(holder),
-            2 => self.pager.page(holder).prefetch(slot),
-            _ => {
-                let page = self.pager.page(holder);
-                page.prefetch_children(slot);
-                if self.mesh.is_some() {
-                    page.prefetch_brought(slot);
-                }
-            }
-        }
-    }
-
-    fn look_ahead(&self) -> u32 {
-        self.pager.frames_ahead()
-    }
-
-    fn will_need(&mut self, node: NodeId, frames: u32) {
-        // Unfolding and folding both take the node's own page and no other.
-        self.pager.foresee(self.place(node).0, frames);
-    }
-
-    fn peek(&self, node: NodeId, children: &mut Vec<(NodeId, Bounds)>) -> bool {
-        let is_here = self.is_resident(node);
-        if is_here {
-            children.extend(self.children_and_bounds(node));
-        }
-        is_here
-    }
-
-    fn pass(&mut self, time: Duration) -> Result<(), TreeError> {
-        self.pager.pass(time);
-        Ok(())
-    }
-
-    fn begin_frame(&mut self, arrived: &mut Vec<NodeId>) -> Result<(), TreeError> {
-        if let Some(rules) = &mut self.rules {
-            rules.begin_frame();
-        }
-        arrived.append(&mut self.again);
-        self.pager.begin_frame();
-        let mut news = std::mem::take(&mut self.pager.news);
-        for page in news.drain(..).filter(|&page| !self.pager.is_under_way(page)) {
-            let nodes = self.nodes_of(page);
-            while let Some(&node) = self.refused.range(nodes.clone()).next() {
-                self.refused.remove(&node);
-                arrived.push(node);
-            }
-        }
-        self.pager.news = news;
-        Ok(())
-    }
-
-    fn give_up(&mut self, node: NodeId) {
-        self.again.retain(|&other| other != node);
-        let (page, _) = self.place(node);
-        if self.refused.remove(&node) && self.refused.range(self.nodes_of(page)).next().is_none() {
-            self.pager.demote(page);
-        }
-    }
-
-    fn settle(&mut self) -> Result<Duration, TreeError> {
-        Ok(self.pager.settle())
-    }
-
-    #[track_caller]
-    fn assert_well_formed(&self) {
-        if let Some(stars) = &self.mesh {
-            stars.assert_well_formed();
-            assert_eq!(stars.displayed() as u64, self.displayed, "triangles displayed");
-        }
-        self.pager.assert_well_formed();
-    }
-
-    fn end_frame(&mut self) -> Result<PageStats, TreeError> {
-        Ok(self.pager.end_frame())
     }
 }
 

@@ -9,7 +9,7 @@ use common::{Front, bytes, frame, holder_bytes, random_log};
 use meta_node::{BuildOptions, Io, MetaNodeFile, MetaNodeTree, Settings};
 use vertex_tree::simulated::Simulated;
 use vertex_tree::source::MemorySource;
-use vertex_tree::{NodeId, NullSink, PageStats, Prefetch, Step, VertexTree};
+use vertex_tree::{Hierarchy, NodeId, NullSink, PageStats, Prefetch, Step, VertexTree};
 
 const MS: Duration = Duration::from_millis(1);
 

@@ -9,7 +9,7 @@ use std::time::{Duration, Instant};
 use common::{Front, Random, bytes, frame, holder_bytes, random_log};
 use meta_node::{BuildOptions, InUse, MetaNodeError, MetaNodeFile, MetaNodeTree, Settings};
 use vertex_tree::source::{Faults, Faulty, MemorySource, PageSource, Throttled};
-use vertex_tree::{NullSink, VertexTree};
+use vertex_tree::{Hierarchy, NullSink, VertexTree};
 
 const PAGES: BuildOptions = BuildOptions { levels: Some(3), page_bytes: 700 };
 
@@ -28,7 +28,7 @@ fn everything_unfolds_and_folds_with_four_place_holders() {
     let page_memory = 4 * holder_bytes(&file);
     let mut tree = MetaNodeTree::new(file, Settings { page_memory, ..Settings::default() }).unwrap();
     tree.base_mesh(&mut NullSink).unwrap();
-    let base = tree.displayed_triangles();
+    let base = tree.displayed();
     let mut front = Front::new(&tree);
     let (mut frames, mut refusals) = (0, 0);
     while front.active.len() < 60 * 60 - 3 {
@@ -40,7 +40,7 @@ fn everything_unfolds_and_folds_with_four_place_holders() {
         tree.settle().unwrap();
     }
     assert!(refusals > 1000, "{refusals}");
-    assert_eq!(tree.displayed_triangles(), 2 * 59 * 59);
+    assert_eq!(tree.displayed(), 2 * 59 * 59);
     // Children were unfolded after their parents: from the last to the first, each is collapsible in its turn.
     while !front.active.is_empty() {
         let (_, stats) = frame(&mut tree, |tree| front.fold(tree));
@@ -49,7 +49,7 @@ fn everything_unfolds_and_folds_with_four_place_holders() {
         assert!(frames < 60_000, "{} nodes left after {frames} frames", front.active.len());
         tree.settle().unwrap();
     }
-    assert_eq!(tree.displayed_triangles(), base);
+    assert_eq!(tree.displayed(), base);
 }
 
 /// As printed: three place holders not in use are left for switching up, so that a front that needs more than there are

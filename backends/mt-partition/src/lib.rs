@@ -4,7 +4,7 @@
 //! ```
 //! # use std::sync::Arc;
 //! # use vertex_tree::source::FileSource;
-//! # use vertex_tree::{CollapseLog, NullSink, VertexTree};
+//! # use vertex_tree::{CollapseLog, NullSink, Hierarchy, VertexTree};
 //! # use mt_partition::{BuildOptions, MtFile, MtTree, Settings, write};
 //! # fn main() -> Result<(), Box<dyn std::error::Error>> {
 //! # let folder = tempfile::tempdir()?;

@@ -8,7 +8,7 @@
 //!
 //! The paper reads what its traversal comes upon, and goes on when it is there. Here a change is refused until its group has come, so that
 //! no frame waits; what is read and what is kept is as printed ([`Prefetch::Paper`]). Whoever wants it as printed waits for
-//! [`settle`](vertex_tree::VertexTree::settle) and asks again, as foldfront's `Settled` does (`--prefetch blocking`).
+//! [`settle`](vertex_tree::Hierarchy::settle) and asks again, as foldfront's `Settled` does (`--prefetch blocking`).
 //!
 //! Groups come first. What is foreseen (`foresight`) is fetched behind them and has to make do with the room that they
 //! leave (`room`).

@@ -177,7 +177,7 @@ impl Reader {
     }
 
     /// A store on virtual time, without a thread: reads are made while a tree lets time
-    /// [`pass`](vertex_tree::VertexTree::pass), in the thread that calls it.
+    /// [`pass`](vertex_tree::Hierarchy::pass), in the thread that calls it.
     #[must_use]
     pub fn simulated(store: Simulated) -> Self {
         let clock = Some(Clock { line: simulated::Line::new(store), passed: Duration::ZERO });

@@ -3,7 +3,7 @@
 use std::sync::Arc;
 
 use vertex_tree::{
-    Bounds, MeshSink, NONE, NodeId, PageStats, Prefetch, Step, TreeError, VertexId, VertexTree,
+    Bounds, Hierarchy, MeshSink, NONE, NodeId, PageStats, Prefetch, Step, TreeError, VertexId, VertexTree,
 };
 
 use crate::MtError;
@@ -89,7 +89,7 @@ impl MtTree {
     }
 
     /// Asks for all nodes, as far as there is room for them, and lets go of nothing from now on unless room is needed,
-    /// whatever the cache mode: for a viewer with memory for everything. See [`settle`](VertexTree::settle).
+    /// whatever the cache mode: for a viewer with memory for everything. See [`settle`](Hierarchy::settle).
     pub fn load_all(&mut self) {
         self.paging.load_all();
     }
@@ -137,14 +137,14 @@ impl MtTree {
     }
 }
 
-impl VertexTree for MtTree {
+impl Hierarchy for MtTree {
     const PREPARATION: usize = 3;
 
     fn node_limit(&self) -> u32 {
         self.file.nodes()
     }
 
-    fn displayed_triangles(&self) -> u64 {
+    fn displayed(&self) -> u64 {
         self.displayed
     }
 
@@ -196,54 +196,6 @@ impl VertexTree for MtTree {
         self.file.log_numbers[node.index()]
     }
 
-    fn base_mesh<M: MeshSink>(&mut self, mesh: &mut M) -> Result<(), TreeError> {
-        if M::KEEPS_MESH {
-            let mut display = Display::new();
-            display.show(&self.file.base, |_, _| true, mesh);
-            self.display = Some(display);
-        }
-        Ok(())
-    }
-
-    fn unfold<M: MeshSink>(&mut self, node: NodeId, mesh: &mut M) -> Result<Step, TreeError> {
-        if !self.paging.has(node.0, Change::Unfold) {
-            return Ok(Step::NotResident);
-        }
-        self.change(node.0, Change::Unfold);
-        if let (true, Some(display), Some(record)) =
-            (M::KEEPS_MESH, &mut self.display, self.paging.residents.get(node.0))
-        {
-            // What appears first shares vertices with what disappears then.
-            display.show(record, |_, _| true, mesh);
-            for (above, _) in record.above() {
-                display.hide(above, node.0, mesh);
-            }
-        }
-        Ok(Step::Done)
-    }
-
-    fn fold<M: MeshSink>(&mut self, node: NodeId, mesh: &mut M) -> Result<Step, TreeError> {
-        if !self.paging.has(node.0, Change::Fold) {
-            return Ok(Step::NotResident);
-        }
-        self.change(node.0, Change::Fold);
-        if let (true, Some(display), Some(record)) =
-            (M::KEEPS_MESH, &mut self.display, self.paging.residents.get(node.0))
-        {
-            for (above, position) in record.above() {
-                let parent =
-                    if above == NONE { Some(&self.file.base) } else { self.paging.residents.get(above) };
-                if let Some(parent) = parent {
-                    display.show(parent, |at, below| at == position as usize && below == node.0, mesh);
-                }
-            }
-            for arc in record.arcs() {
-                display.hide(node.0, arc.below, mesh);
-            }
-        }
-        Ok(Step::Done)
-    }
-
     #[inline]
     fn prepare(&self, node: NodeId, step: usize) {
         self.paging.prepare(node.0, step);
@@ -293,5 +245,55 @@ impl VertexTree for MtTree {
 
     fn end_frame(&mut self) -> Result<PageStats, TreeError> {
         Ok(self.paging.end_frame())
+    }
+}
+
+impl VertexTree for MtTree {
+    fn base_mesh<M: MeshSink>(&mut self, mesh: &mut M) -> Result<(), TreeError> {
+        if M::KEEPS_MESH {
+            let mut display = Display::new();
+            display.show(&self.file.base, |_, _| true, mesh);
+            self.display = Some(display);
+        }
+        Ok(())
+    }
+
+    fn unfold<M: MeshSink>(&mut self, node: NodeId, mesh: &mut M) -> Result<Step, TreeError> {
+        if !self.paging.has(node.0, Change::Unfold) {
+            return Ok(Step::NotResident);
+        }
+        self.change(node.0, Change::Unfold);
+        if let (true, Some(display), Some(record)) =
+            (M::KEEPS_MESH, &mut self.display, self.paging.residents.get(node.0))
+        {
+            // What appears first shares vertices with what disappears then.
+            display.show(record, |_, _| true, mesh);
+            for (above, _) in record.above() {
+                display.hide(above, node.0, mesh);
+            }
+        }
+        Ok(Step::Done)
+    }
+
+    fn fold<M: MeshSink>(&mut self, node: NodeId, mesh: &mut M) -> Result<Step, TreeError> {
+        if !self.paging.has(node.0, Change::Fold) {
+            return Ok(Step::NotResident);
+        }
+        self.change(node.0, Change::Fold);
+        if let (true, Some(display), Some(record)) =
+            (M::KEEPS_MESH, &mut self.display, self.paging.residents.get(node.0))
+        {
+            for (above, position) in record.above() {
+                let parent =
+                    if above == NONE { Some(&self.file.base) } else { self.paging.residents.get(above) };
+                if let Some(parent) = parent {
+                    display.show(parent, |at, below| at == position as usize && below == node.0, mesh);
+                }
+            }
+            for arc in record.arcs() {
+                display.hide(node.0, arc.below, mesh);
+            }
+        }
+        Ok(Step::Done)
     }
 }

@@ -16,8 +16,10 @@
 
 mod bounds;
 mod curve;
+mod error;
 pub mod external;
 mod georeference;
+mod hierarchy;
 mod leaf_map;
 mod leaf_set;
 mod log;
@@ -26,6 +28,7 @@ mod log_source;
 mod look_ahead;
 mod mesh;
 pub mod output;
+mod paging;
 mod prefetch;
 pub mod sections;
 pub mod simulated;
@@ -37,13 +40,16 @@ mod tree;
 
 pub use bounds::{Bounds, NormalCone};
 pub use curve::z_order;
+pub use error::TreeError;
 pub use georeference::{DegreeMap, Georeference, Rounding};
+pub use hierarchy::{Hierarchy, NodeId, Refine, Step};
 pub use log::{Collapse, CollapseLog, Forest, LogError, NONE};
 pub use log_file::{LogCounts, LogFileError, log_file_version, read_log, write_log, write_log_from};
 pub use log_source::{LogFile, LogSource, Records};
 pub use look_ahead::LookAhead;
 pub use mesh::Mesh;
+pub use paging::{PageStats, Prefetch};
 pub use prefetch::prefetch;
 pub use sink::{MeshSink, NullSink, TriangleId, VertexId};
 pub use star_mesh::{LeafTriangle, StarMesh};
-pub use tree::{NodeId, PageStats, Prefetch, Step, TreeError, VertexTree};
+pub use tree::VertexTree;

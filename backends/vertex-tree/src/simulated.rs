@@ -1,7 +1,7 @@
 //! A store on virtual time: a line of a given latency and bandwidth.
 //!
 //! A replay in real time is only worth comparing if it can be repeated. Here the clock is told how much time has passed
-//! (see [`VertexTree::pass`](crate::VertexTree::pass)), so that the same replay has the same misses on any machine,
+//! (see [`Hierarchy::pass`](crate::Hierarchy::pass)), so that the same replay has the same misses on any machine,
 //! and disks, network drives and object stores can all be tried on one.
 //!
 //! The model: up to `depth` reads are under way at a time. Each takes the latency, which passes for all of them at

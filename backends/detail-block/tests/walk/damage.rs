@@ -4,7 +4,7 @@ use std::sync::Arc;
 
 use detail_block::{Arrangement, MAGIC, XfmError, XfmFile, XfmTree};
 use vertex_tree::source::MemorySource;
-use vertex_tree::{MeshSink, NodeId, Step, TriangleId, VertexId, VertexTree};
+use vertex_tree::{Hierarchy, MeshSink, NodeId, Step, TriangleId, VertexId, VertexTree};
 
 use crate::driver::bytes_of;
 use crate::meshes::{Random, random_log, torus};

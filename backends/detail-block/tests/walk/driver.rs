@@ -5,7 +5,9 @@ use std::sync::Arc;
 
 use detail_block::{Arrangement, Settings, XfmFile, XfmTree};
 use vertex_tree::source::MemorySource;
-use vertex_tree::{CollapseLog, MeshSink, NodeId, Step, TreeError, TriangleId, VertexId, VertexTree};
+use vertex_tree::{
+    CollapseLog, Hierarchy, MeshSink, NodeId, Step, TreeError, TriangleId, VertexId, VertexTree,
+};
 
 /// Keeps the displayed mesh and holds the tree to the order of calls that is promised.
 #[derive(Default)]
@@ -156,6 +158,6 @@ impl Driver {
         let mut shown: Vec<_> = self.mesh.triangles.values().map(|t| key(t.map(position))).collect();
         shown.sort_unstable();
         assert!(shown == displayed(log, &numbers), "the displayed triangles are not those of the log");
-        assert_eq!(self.tree.displayed_triangles(), shown.len() as u64);
+        assert_eq!(self.tree.displayed(), shown.len() as u64);
     }
 }

@@ -8,7 +8,7 @@ use std::time::Duration;
 use detail_block::{BuildOptions, Io, Settings, XfmFile};
 use vertex_tree::simulated::Simulated;
 use vertex_tree::source::{Faults, Faulty, MemorySource};
-use vertex_tree::{NodeId, PageStats, Prefetch, Step, VertexTree};
+use vertex_tree::{Hierarchy, NodeId, PageStats, Prefetch, Step, VertexTree};
 
 use crate::driver::{Driver, open};
 use crate::meshes::Random;

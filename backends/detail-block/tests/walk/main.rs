@@ -10,7 +10,7 @@ mod paging;
 use detail_block::{Arrangement, BuildOptions, Io, Settings};
 use driver::{Driver, bytes_of, open};
 use meshes::{Random, grid, random_log, rubble, torus};
-use vertex_tree::{CollapseLog, Mesh, NodeId, VertexTree};
+use vertex_tree::{CollapseLog, Hierarchy, Mesh, NodeId, VertexTree};
 
 fn options(levels: u32, quantize: bool, nest_needs: bool) -> BuildOptions {
     BuildOptions { levels, quantize, nest_needs }
@@ -87,7 +87,7 @@ fn every_step_leaves_a_manifold_mesh() {
             driver.tree.assert_well_formed();
             driver.assert_shows(&effective);
             assert_eq!(driver.active.len() as u64, report.nodes);
-            assert_eq!(driver.tree.displayed_triangles(), report.triangles);
+            assert_eq!(driver.tree.displayed(), report.triangles);
             if !options.quantize {
                 assert_is_input(&driver, &log);
             }
@@ -147,7 +147,7 @@ fn selection_needs_no_mesh() {
             }
         }
         bare.assert_well_formed();
-        assert_eq!(driver.tree.displayed_triangles(), bare.displayed_triangles());
+        assert_eq!(driver.tree.displayed(), bare.displayed());
     }
 }
 
@@ -178,6 +178,6 @@ fn an_empty_mesh_and_one_that_is_all_degenerate() {
         file.verify().unwrap();
         let driver = Driver::new(&file, Settings::default());
         driver.tree.assert_well_formed();
-        assert_eq!((driver.tree.displayed_triangles(), driver.tree.roots().len()), (0, 0));
+        assert_eq!((driver.tree.displayed(), driver.tree.roots().len()), (0, 0));
     }
 }

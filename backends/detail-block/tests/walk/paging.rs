@@ -6,7 +6,7 @@ use std::time::Duration;
 use detail_block::{ATTEMPTS, Arrangement, BuildOptions, Io, Settings, XfmFile};
 use vertex_tree::simulated::Simulated;
 use vertex_tree::source::{Faults, Faulty, MemorySource};
-use vertex_tree::{CollapseLog, NodeId, VertexTree};
+use vertex_tree::{CollapseLog, Hierarchy, NodeId};
 
 use crate::driver::{Driver, bytes_of, open};
 use crate::meshes::{Random, random_log, torus};
@@ -167,7 +167,7 @@ fn faults_cost_nothing_but_time() {
             driver.tree.end_frame().unwrap();
             driver.tree.settle().unwrap();
         }
-        assert_eq!(driver.tree.displayed_triangles(), log.mesh.triangles.len() as u64, "{io:?}");
+        assert_eq!(driver.tree.displayed(), log.mesh.triangles.len() as u64, "{io:?}");
         driver.assert_shows(&log);
     }
 }

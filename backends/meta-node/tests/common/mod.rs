@@ -6,7 +6,7 @@ use std::sync::Arc;
 
 use meta_node::{BuildOptions, MetaNodeError, MetaNodeFile, MetaNodeTree};
 use vertex_tree::source::MemorySource;
-use vertex_tree::{Bounds, Collapse, CollapseLog, Mesh, NodeId, NullSink, Step, VertexTree};
+use vertex_tree::{Bounds, Collapse, CollapseLog, Hierarchy, Mesh, NodeId, NullSink, Step, VertexTree};
 
 /// A small generator with a fixed sequence.
 pub struct Random(pub u64);
