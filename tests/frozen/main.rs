@@ -1,6 +1,7 @@
 //! Files of every version of every format: they open, and give what they were made of; and the last version is written, byte
 //! for byte, whatever the memory.
 
+mod cuts;
 mod unknown;
 
 use std::path::{Path, PathBuf};

@@ -1,0 +1,128 @@
+//! Cuts, files and what paging does, as they were on 30 November 2026: whatever moves in the code, none of these may.
+//!
+//! `cuts.txt` has a line for each file that is written of a built-in scene, for each recorded path through it, backend and
+//! strategy (every frame's cut, its size and its triangles), and for each way to fetch ahead on virtual time (every frame's cut,
+//! misses, reads and bytes). Where something is meant to change, the new table is printed, to be looked at.
+
+use std::fmt::Write;
+use std::path::Path as FilePath;
+use std::time::Duration;
+
+use detail_block::XfmTree;
+use foldfront::compare::{Loading, Options, Pace, Subject};
+use foldfront::engine::{Engine, Settings};
+use foldfront::path::{Path, recorded};
+use foldfront::refine::Strategy;
+use foldfront::scene::{Scene, SceneKind};
+use foldfront::settled::Settled;
+use foldfront::simplify;
+use foldfront::store::{self, Backend, BuildOptions, Store};
+use foldfront::vertex_tree::simulated::Simulated;
+use foldfront::vertex_tree::{Hierarchy, NullSink, Prefetch, Refine};
+use foldfront::view::theta_of_pixels;
+use in_memory::InMemoryTree;
+use meta_node::MetaNodeTree;
+use mt_partition::MtTree;
+
+/// A number for a sequence of numbers.
+fn digest(numbers: impl IntoIterator<Item = u64>) -> u64 {
+    // FNV-1a, a word at a time, and mixed.
+    let mix = |digest: u64, x: u64| (digest ^ x).wrapping_mul(0x0000_0100_0000_01b3).rotate_left(29);
+    numbers.into_iter().fold(0xcbf2_9ce4_8422_2325, mix)
+}
+
+/// All cuts along a path, each with as many pages as it needs.
+fn settled<T: Hierarchy + Refine<NullSink>>(tree: T, path: &Path, strategy: Strategy) -> u64 {
+    let usual = path.motion_percentile(99.0);
+    let settings = Settings { strategy, rho: usual.rho, omega: usual.omega, ..Settings::default() };
+    let mut engine = Engine::new(Settled::new(tree), NullSink, settings).unwrap();
+    let frames = (0..path.frames.len()).flat_map(|frame| {
+        let report = engine.advance(&[path.view(frame, theta_of_pixels(1.0, 1080)).unwrap()]).unwrap();
+        [report.cut_hash, report.active_nodes, report.displayed]
+    });
+    digest(frames)
+}
+
+/// The lines of a scene.
+fn table(kind: SceneKind, folder: &FilePath) -> String {
+    let mut lines = String::new();
+    let mesh = Scene::new(kind).mesh(&mut |_, _| ());
+    let log = simplify::build(mesh, &simplify::Options::default(), &mut |_, _| ()).unwrap().0;
+    for backend in Backend::ALL {
+        let file = folder.join(backend.name());
+        store::write(backend, &file, &log, &BuildOptions::default()).unwrap();
+        let bytes = std::fs::read(&file).unwrap();
+        let (name, words) = (backend.name(), bytes.iter().map(|&byte| u64::from(byte)));
+        writeln!(lines, "{} file {name} {:016x}", kind.name(), digest(words)).unwrap();
+        let mut subject = Subject::of_store(kind.name(), Store::open(&file).unwrap());
+        for path in recorded(kind).unwrap() {
+            for strategy in Strategy::ALL {
+                let digest = match Store::open(&file).unwrap() {
+                    Store::InMemory(hierarchy, _) => settled(InMemoryTree::new(hierarchy), &path, strategy),
+                    Store::MetaNode(file) => {
+                        let settings = meta_node::Settings { prefetch: Prefetch::None, ..Default::default() };
+                        settled(MetaNodeTree::new(file, settings).unwrap(), &path, strategy)
+                    }
+                    Store::DetailBlock(file) => {
+                        let settings =
+                            detail_block::Settings { prefetch: Prefetch::None, ..Default::default() };
+                        settled(XfmTree::new(file, settings).unwrap(), &path, strategy)
+                    }
+                    Store::MtPartition(file) => {
+                        let settings =
+                            mt_partition::Settings { prefetch: Prefetch::None, ..Default::default() };
+                        settled(MtTree::new(file, settings).unwrap(), &path, strategy)
+                    }
+                };
+                writeln!(lines, "{} {name} {} {digest:016x}", path.name, strategy.name()).unwrap();
+            }
+            let all = 0..path.frames.len();
+            if backend == Backend::InMemory {
+                continue;
+            }
+            let millisecond = Duration::from_millis(1);
+            let timed = Options {
+                strategies: vec![Strategy::Event],
+                prefetch: vec![Loading::Paper, Loading::Schedule, Loading::None],
+                pace: Pace::Simulated(Duration::from_secs(1) / 60, Simulated::with_latency(5 * millisecond)),
+                ..Options::default()
+            };
+            for run in subject.replay(&path, all.clone(), &timed, &mut |_, _| ()).unwrap() {
+                let digest = digest(run.rows.iter().flat_map(|row| {
+                    let pages = row.report.pages;
+                    [row.report.cut_hash, row.report.misses, pages.reads, pages.read_bytes]
+                }));
+                writeln!(lines, "{} {name} {} {digest:016x}", run.path, run.prefetch.name()).unwrap();
+            }
+        }
+    }
+    lines
+}
+
+fn check(kind: SceneKind) {
+    let folder = tempfile::tempdir().unwrap();
+    let found = table(kind, folder.path());
+    let all = include_str!("cuts.txt");
+    let expected: Vec<&str> = all.lines().filter(|line| line.starts_with(kind.name())).collect();
+    let differ: Vec<(&str, &str)> =
+        found.lines().zip(expected.iter().copied()).filter(|(found, expected)| found != expected).collect();
+    assert!(
+        differ.is_empty() && found.lines().count() == expected.len(),
+        "{differ:?} differ (found, expected); all that was found:\n{found}"
+    );
+}
+
+#[test]
+fn of_the_city() {
+    check(SceneKind::City);
+}
+
+#[test]
+fn of_the_alps() {
+    check(SceneKind::Alps);
+}
+
+#[test]
+fn of_the_laser_scan() {
+    check(SceneKind::Laserscan);
+}
