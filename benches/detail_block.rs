@@ -1,5 +1,6 @@
 //! The experiments of XFastMesh (DeCoro & Pajarola 2002) on detail blocks: sizes (their Table 1), construction (Table 2),
-//! frames (Table 3), the tolerance steered to a frame time (Figure 10); and what they did not report: blocks that are
+//! frames (Table 3), what packing saves and how soon a first frame is there (section 4), the tolerance steered to a frame time
+//! (Figure 10); and what they did not report: blocks that are
 //! loaded again soon after their removal, what a mapped block index gives over one that is read, what forcing costs against nesting, what the normal-cone test spares, and what
 //! quantisation costs in pixels.
 //!
@@ -121,14 +122,14 @@ fn frames(name: &str, file: &Arc<XfmFile>, path: &Path, strategy: Strategy) {
     let mut first = 0;
     for frame in 0..count {
         let report = engine.advance(&[view(path, frame)]).expect("the store is there");
-        engine.mesh_mut().clear_changes();
+        engine.sink_mut().clear_changes();
         if frame == 0 {
             // The first frame loads what the path starts with.
             start = engine.tree().counts();
             first = report.unfolds;
             continue;
         }
-        shown += report.triangles;
+        shown += report.displayed;
         updates += report.unfolds + report.folds;
         tests += report.tests;
         (select, apply) = (select + report.select, apply + report.apply);
@@ -204,7 +205,7 @@ fn nesting(name: &str, nested: &Arc<XfmFile>, forcing: &Arc<XfmFile>, path: &Pat
         let (mut nodes, mut triangles, mut unfolds, mut forced) = (0, 0, 0, 0);
         for frame in 0..path.frames.len() {
             let report = engine.advance(&[view(path, frame)]).expect("the store is there");
-            (nodes, triangles) = (nodes + report.active_nodes, triangles + report.triangles);
+            (nodes, triangles) = (nodes + report.active_nodes, triangles + report.displayed);
             (unfolds, forced) = (unfolds + report.unfolds, forced + report.forced);
         }
         let n = path.frames.len() as u64;
@@ -225,7 +226,7 @@ fn cones(name: &str, file: &Arc<XfmFile>, path: &Path, strategy: Strategy) {
         for frame in 0..path.frames.len() {
             let report = engine.advance(&[view(path, frame)]).expect("the store is there");
             if frame > 0 {
-                triangles += report.triangles;
+                triangles += report.displayed;
                 updates += report.unfolds + report.folds;
                 tests += report.tests;
                 times.push(report.select.as_secs_f64() * 1e3);
@@ -243,6 +244,47 @@ fn cones(name: &str, file: &Arc<XfmFile>, path: &Path, strategy: Strategy) {
     );
 }
 
+/// What the file would take with a place for every node that a block can have, and with two numbers of children's blocks in
+/// every place of a block's lowest level.
+fn packing(file: &XfmFile) {
+    let facts = file.facts();
+    let fact = |wanted: &str| -> u64 {
+        let found = facts.iter().find(|&&(name, _)| name == wanted);
+        found.and_then(|(_, value)| value.parse().ok()).expect("a number")
+    };
+    let (bytes, nodes, blocks) = (fact("bytes"), fact("nodes"), fact("detail blocks"));
+    let (node_bytes, levels) = (fact("node bytes"), fact("levels a block"));
+    let unpacked = bytes + (blocks * ((1 << levels) - 1) - nodes) * node_bytes;
+    // Blocks that are no leaves have a number, of four bytes, for each place below their lowest level.
+    let pointers = bytes + fact("leaf blocks") * (1 << levels) * 4;
+    let more = |other: u64| 100.0 * (other as f64 / bytes as f64 - 1.0);
+    println!(
+        "| {bytes} | {unpacked}, {:.0} % more | {pointers}, {:.0} % more |",
+        more(unpacked),
+        more(pointers)
+    );
+}
+
+/// From the closed file to the coarsest mesh, and on to the first frame of a path at one pixel: medians of several times, ms.
+fn first_frame(name: &str, path: &std::path::Path, walk: &Path) {
+    const RUNS: usize = 7;
+    let mut times = [Vec::new(), Vec::new()];
+    for _ in 0..RUNS {
+        let start = Instant::now();
+        let source = FileSource::open(path).expect("it was just written");
+        let file = Arc::new(XfmFile::open(Arc::new(source)).expect("it was just written"));
+        let mut engine = engine(&file, ActiveMesh::new(), walk, Strategy::Event, SOFT);
+        times[0].push(start.elapsed());
+        engine.advance(&[view(walk, 0)]).expect("the store is there");
+        times[1].push(start.elapsed());
+    }
+    let [coarse, first] = times.map(|mut times| {
+        times.sort_unstable();
+        times[RUNS / 2].as_secs_f64() * 1e3
+    });
+    println!("| {name}, {} | {coarse:.1} | {first:.1} |", walk.name);
+}
+
 /// Distances to the original in pixels: 99 % and largest, the worse of both ways, over some frames.
 fn deviation(log: &CollapseLog, file: &Arc<XfmFile>, path: &Path) -> (f64, f64) {
     let reference = Reference::new(&log.mesh);
@@ -251,7 +293,7 @@ fn deviation(log: &CollapseLog, file: &Arc<XfmFile>, path: &Path) -> (f64, f64) 
     for frame in (60..path.frames.len()).step_by(path.frames.len() / 4) {
         engine.advance(&[view(path, frame)]).expect("the store is there");
         let found =
-            reference.deviation(&engine.mesh().to_mesh(), &path.camera(frame).expect("a camera"), LINES);
+            reference.deviation(&engine.sink().to_mesh(), &path.camera(frame).expect("a camera"), LINES);
         for way in [&found.forward, &found.reverse] {
             (p99, most) = (p99.max(way.inner.p99), most.max(way.inner.max));
         }
@@ -276,7 +318,7 @@ fn displacement(log: &CollapseLog, quantised: &CollapseLog, path: &Path) -> f64 
 
 /// Figure 10: the tolerance follows a frame time.
 fn steered(name: &str, file: &Arc<XfmFile>, path: &Path) {
-    for target in [Duration::from_micros(100), Duration::from_micros(500)] {
+    for target in [100, 500, 2000].map(Duration::from_micros) {
         let mut engine = engine(file, ActiveMesh::new(), path, Strategy::Event, SOFT);
         engine.set_budget(Budget::FrameTime(target));
         let mut times = Vec::new();
@@ -284,12 +326,12 @@ fn steered(name: &str, file: &Arc<XfmFile>, path: &Path) {
         for frame in 0..path.frames.len() {
             let asked = path.view(frame, theta_of_pixels(0.1, LINES)).expect("a view");
             let report = engine.advance(&[asked]).expect("the store is there");
-            engine.mesh_mut().clear_changes();
+            engine.sink_mut().clear_changes();
             if frame >= 60 {
                 times.push(report.select.as_secs_f64() * 1e3);
                 let pixels = 0.1 * asked.k() / engine.views()[0].k();
                 (least, most) = (least.min(pixels), most.max(pixels));
-                triangles = (triangles.0.min(report.triangles), triangles.1.max(report.triangles));
+                triangles = (triangles.0.min(report.displayed), triangles.1.max(report.displayed));
             }
         }
         times.sort_by(f64::total_cmp);
@@ -333,6 +375,12 @@ fn main() {
             fact(&plain, "leaf blocks"),
             fact(&plain, "nodes a block"),
         );
+        println!(
+            "\n| bytes | with a place for every node | with children's blocks in leaves |\n| --- | --- | --- |"
+        );
+        packing(&plain.file);
+        println!("\n| from the file, ms | to the coarsest mesh | to the first frame |\n| --- | --- | --- |");
+        paths.iter().for_each(|path| first_frame(&name, &plain.path, path));
         println!("\n| construction | s | us a triangle |\n| --- | --- | --- |");
         for (what, seconds) in
             [("simplification", simplified), ("file", plain.seconds), ("file, quantised", quantised.seconds)]

@@ -17,6 +17,7 @@ use std::time::{Duration, Instant};
 use foldfront::active_mesh::ActiveMesh;
 use foldfront::engine::Engine;
 use foldfront::path::Path;
+use foldfront::path::import::Mode;
 use foldfront::refine::Strategy;
 use foldfront::vertex_tree::{Prefetch, VertexTree};
 use foldfront::view::View;
@@ -39,7 +40,10 @@ const SLACK: u64 = 4 << 20;
 /// quarter it gets nowhere.
 const SHARES: [(u64, u64, bool); 4] = [(1, 8, false), (1, 4, true), (1, 2, true), (3, 4, true)];
 
-pub fn table() {
+/// Three meshes, each with a path.
+const MESHES: [(&str, (&str, Mode, f64)); 3] = [("dragon", DRONE), ("happy", DRONE), ("boston", CAR)];
+
+pub fn table(words: &[String]) {
     let Some(group) = Group::new() else {
         println!("frames: no control group with a memory limit can be made here; nothing is measured");
         return;
@@ -48,7 +52,12 @@ pub fn table() {
         "mesh     of the file  tree      frames   us a frame: mean  median      p99      max   misses %  changes/frame  \
          triangles  major faults   of the first view"
     );
-    for (name, (trajectory, mode, rate)) in [("dragon", DRONE), ("happy", DRONE), ("boston", CAR)] {
+    let is_named = |name: &str| words.iter().any(|word| word == name);
+    let is_choice = MESHES.iter().any(|&(name, _)| is_named(name));
+    for (name, (trajectory, mode, rate)) in MESHES {
+        if is_choice && !is_named(name) {
+            continue;
+        }
         let Some((log, _)) = log(name) else { continue };
         let Some(mut walk) = imported(trajectory, &log, mode, rate) else { continue };
         walk.frames.truncate(FRAMES);
@@ -197,7 +206,7 @@ fn replay<T: VertexTree>(tree: T, walk: &Path, views: &[View]) {
     loop {
         let report = engine.advance(&views[..1]).expect("the store is fine");
         engine.tree_mut().settle().expect("the store is fine");
-        engine.mesh_mut().clear_changes();
+        engine.sink_mut().clear_changes();
         if report.misses == 0 {
             break;
         }
@@ -209,11 +218,11 @@ fn replay<T: VertexTree>(tree: T, walk: &Path, views: &[View]) {
         next = (next + Duration::from_micros(16_667)).max(Instant::now());
         std::thread::sleep(next.saturating_duration_since(Instant::now()));
         let report = engine.advance(std::slice::from_ref(view)).expect("the store is fine");
-        engine.mesh_mut().clear_changes();
+        engine.sink_mut().clear_changes();
         times.push(report.select.as_nanos() as f64 / 1e3);
         misses += report.misses;
         changes += report.unfolds + report.folds;
-        triangles += report.triangles;
+        triangles += report.displayed;
         if start.elapsed() > PATIENCE {
             break;
         }

@@ -1,7 +1,7 @@
 //! Meta-node trees against the in-memory tree and against virtual memory: the tables of El-Sana & Chiang (2000).
 //!
-//! `cargo bench --bench meta_node -- [construction] [selection] [working-set] [misses [MESH...]] [frames]`; all of them without
-//! a word.
+//! `cargo bench --bench meta_node -- [construction] [selection] [working-set] [misses] [frames] [MESH...]`; all of
+//! them without a word. Meshes choose among those of `misses` and `frames`.
 //!
 //! * `construction`: their Table 1, processor time of the collapse log and of the meta-nodes, sizes of the files, and the
 //!   place holders that levels and pages of other sizes would make.
@@ -42,6 +42,6 @@ fn main() {
         misses::table(&words);
     }
     if is_chosen("frames") {
-        frames::table();
+        frames::table(&words);
     }
 }

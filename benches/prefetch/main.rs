@@ -2,10 +2,11 @@
 //! foresight, and the time that frames wait where they load as DeCoro & Pajarola and Holst & Schumann print it, along real trajectories over real meshes, on virtual time; then what a slow store does to the time of
 //! selection.
 //!
-//! `cargo bench --bench prefetch [-- PART... MESH...]` prints tables. The parts are `--misses`, `--slow` and `--wall-clock`
-//! (see `slow_store`), all of them unless some are named. The meshes are dragon, happy and sierra (four tiles) of the shared
+//! `cargo bench --bench prefetch [-- PART... MESH...]` prints tables. The parts are `--misses`, `--bytes` (see `bytes`), `--slow` and `--wall-clock`
+//! (see `slow_store`), all of them unless some are named. The meshes are dragon, happy, tile (of the Sierra Nevada) and sierra (four of them) of the shared
 //! data, or what is found under these names, as collapse logs, in the folder that `FOLDFRONT_LOGS` names.
 
+mod bytes;
 mod slow_store;
 
 use std::path::{Path as FilePath, PathBuf};
@@ -24,9 +25,10 @@ use foldfront::vertex_tree::simulated::Simulated;
 
 const DATA: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/../shared/data");
 
-const MESHES: [(&str, &[&str]); 3] = [
+const MESHES: [(&str, &[&str]); 4] = [
     ("dragon", &["meshes/dragon.ply"]),
     ("happy", &["meshes/happy.ply"]),
+    ("tile", &["terrain/N36W119.hgt"]),
     ("sierra", &["terrain/N36W119.hgt", "terrain/N36W118.hgt", "terrain/N37W119.hgt", "terrain/N37W118.hgt"]),
 ];
 
@@ -50,6 +52,7 @@ const LATENCY: Duration = Duration::from_millis(5);
 #[derive(Clone, Copy)]
 struct Parts {
     misses: bool,
+    bytes: bool,
     slow: bool,
     wall_clock: bool,
 }
@@ -58,11 +61,12 @@ fn main() {
     let is_named = |part: &str| std::env::args().any(|argument| argument == part);
     let mut parts = Parts {
         misses: is_named("--misses"),
+        bytes: is_named("--bytes"),
         slow: is_named("--slow"),
         wall_clock: is_named("--wall-clock"),
     };
-    if !(parts.misses || parts.slow || parts.wall_clock) {
-        parts = Parts { misses: true, slow: true, wall_clock: true };
+    if !(parts.misses || parts.bytes || parts.slow || parts.wall_clock) {
+        parts = Parts { misses: true, bytes: true, slow: true, wall_clock: true };
     }
     let wanted: Vec<String> = std::env::args().skip(1).filter(|a| !a.starts_with('-')).collect();
     for (mesh, files) in MESHES {
@@ -85,13 +89,17 @@ fn hierarchy(mesh: &str, files: &[&str]) -> Option<foldfront::CollapseLog> {
     Some(built.expect("a mesh").0)
 }
 
+fn is_terrain(mesh: &str) -> bool {
+    matches!(mesh, "tile" | "sierra")
+}
+
 fn compare(mesh: &str, log: &foldfront::CollapseLog, parts: Parts) {
     let folder = tempfile::tempdir().expect("room for files");
     let walks: Vec<Path> = PATHS
         .iter()
         .filter_map(|&(name, file, modes)| {
             let options =
-                import::Options { mode: modes[usize::from(mesh == "sierra")], ..import::Options::default() };
+                import::Options { mode: modes[usize::from(is_terrain(mesh))], ..import::Options::default() };
             let file = FilePath::new(DATA).join(file);
             let mut path =
                 file.exists().then(|| import::import(&file, &log.mesh, &options).expect("a trajectory"))?;
@@ -101,6 +109,7 @@ fn compare(mesh: &str, log: &foldfront::CollapseLog, parts: Parts) {
             Some(path)
         })
         .collect();
+    let stretches = if parts.bytes { bytes::stretches(log, is_terrain(mesh)) } else { Vec::new() };
     for backend in BACKENDS {
         let file = folder.path().join(backend.name());
         store::write(backend, &file, log, &BuildOptions::default()).expect("room for files");
@@ -115,6 +124,11 @@ fn compare(mesh: &str, log: &foldfront::CollapseLog, parts: Parts) {
         if parts.misses {
             heading();
             walks().for_each(|(walk, page_memory)| virtual_time(&file, mesh, walk, page_memory));
+        }
+        if parts.bytes {
+            bytes::heading();
+            let most = bytes::table(&file, mesh, &stretches);
+            println!("at most {most:.3} times the bytes of loading on demand");
         }
         if parts.slow {
             slow_store::heading();
