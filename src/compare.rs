@@ -27,11 +27,12 @@ mod scene;
 use std::ops::{ControlFlow, Range};
 use std::sync::Arc;
 
+use collapse_log::{CollapseLog, Mesh};
 use detail_block::XfmTree;
 use in_memory::{Hierarchy, InMemoryTree};
 use meta_node::MetaNodeTree;
 use mt_partition::MtTree;
-use vertex_tree::{CollapseLog, Mesh, NullSink, TreeError, VertexTree};
+use vertex_tree::{NullSink, TreeError, VertexTree};
 
 pub use self::error::{CompareError, WrongCut};
 pub use self::loading::Loading;

@@ -22,8 +22,8 @@ mod sample;
 
 use std::borrow::Cow;
 
+use collapse_log::Mesh;
 use glam::DVec3;
-use vertex_tree::Mesh;
 
 use crate::bvh::Bvh;
 use crate::frustum::{Clipped, Frustum};

@@ -98,6 +98,10 @@ pub mod simplify;
 pub mod store;
 pub mod view;
 
+pub use collapse_log;
+pub use collapse_log::{Collapse, CollapseLog, Mesh};
+pub use container;
+pub use container::output;
 #[cfg(feature = "detail-block")]
 pub use detail_block;
 pub use glam;
@@ -105,6 +109,6 @@ pub use glam;
 pub use in_memory;
 #[cfg(feature = "mt-partition")]
 pub use mt_partition;
+pub use star_mesh;
 pub use vertex_tree;
-pub use vertex_tree::output;
-pub use vertex_tree::{Bounds, Collapse, CollapseLog, Mesh, NodeId, VertexTree};
+pub use vertex_tree::{Bounds, NodeId, VertexTree};

@@ -13,7 +13,7 @@
 //!
 //! Coordinates are read in the precision of the file: that of 64 bits in text but for a `float` of PLY, and of the type in binary. If
 //! 32 bits hold all of them, the mesh has them as they are; otherwise its positions are about its middle, which is the origin
-//! of its [`Georeference`](crate::vertex_tree::Georeference).
+//! of its [`Georeference`](crate::container::Georeference).
 //!
 //! Vertices are neither split nor merged (but for STL, which has none), so that their numbers are those of the file,
 //! and unused ones are kept. Polygons are triangulated, whether convex or not. What has no surface is left out: a
@@ -59,7 +59,7 @@ pub use write_ply::write_ply;
 
 use std::path::Path;
 
-use vertex_tree::DegreeMap;
+use container::DegreeMap;
 
 use crate::Mesh;
 use crate::progress::Progress;

@@ -17,8 +17,8 @@ mod raster;
 pub use image::{Image, ImageError};
 pub use outside::outside_camera;
 
+use collapse_log::Mesh;
 use glam::DVec3;
-use vertex_tree::Mesh;
 
 use crate::frustum::{Clipped, Frustum};
 use crate::parallel;

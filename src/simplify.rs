@@ -42,8 +42,9 @@ use std::convert::Infallible;
 use std::ops::Range;
 use std::time::{Duration, Instant};
 
+use collapse_log::{Collapse, CollapseLog, LogError, Mesh};
+use container::Georeference;
 use glam::{DVec3, Vec3};
-use vertex_tree::{Collapse, CollapseLog, Georeference, LogError, Mesh};
 
 use crate::parallel;
 use crate::progress::Progress;

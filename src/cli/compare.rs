@@ -4,7 +4,7 @@ use std::ops::Range;
 use std::path::Path as FilePath;
 
 use anyhow::{Context, Result, bail};
-use vertex_tree::Mesh;
+use collapse_log::Mesh;
 
 use super::arguments::Compare;
 use super::destination::check_folder;

@@ -3,7 +3,7 @@
 use std::fmt::Write;
 
 use anyhow::{Context, Result, bail};
-use vertex_tree::Mesh;
+use collapse_log::Mesh;
 
 use super::arguments::{Deviation, Export, LINES, Refinement, Render};
 use super::destination::{Content, check_file};

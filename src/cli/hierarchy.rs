@@ -5,8 +5,9 @@ use std::path::{Path, PathBuf};
 use std::sync::atomic::{AtomicBool, Ordering};
 
 use anyhow::{Context, Result};
+use collapse_log::{CollapseLog, LogFile, Mesh, log_file_version, read_log};
+use container::{DegreeMap, Georeference};
 use serde_json::json;
-use vertex_tree::{CollapseLog, DegreeMap, Georeference, LogFile, Mesh, log_file_version, read_log};
 
 use super::arguments::{Build, Info, Verify};
 use super::destination::{Content, check_file};

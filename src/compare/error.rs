@@ -1,6 +1,7 @@
 //! Why a comparison stops.
 
-use vertex_tree::{LogError, TreeError};
+use collapse_log::LogError;
+use vertex_tree::TreeError;
 
 use super::Loading;
 use crate::criterion::Criterion;

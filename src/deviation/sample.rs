@@ -2,8 +2,8 @@
 
 use std::collections::VecDeque;
 
+use collapse_log::Mesh;
 use glam::DVec3;
-use vertex_tree::Mesh;
 
 use super::{Seen, View, corners};
 use crate::frustum::Clipped;

@@ -17,7 +17,7 @@ use std::io::{BufReader, Read, Seek, SeekFrom, Write};
 use std::ops::Range;
 use std::path::{Path, PathBuf};
 
-use vertex_tree::DegreeMap;
+use container::DegreeMap;
 use zip::ZipArchive;
 use zip::result::ZipError;
 

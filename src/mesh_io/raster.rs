@@ -3,7 +3,7 @@
 use std::ops::Range;
 use std::path::Path;
 
-use vertex_tree::DegreeMap;
+use container::DegreeMap;
 
 use super::terrain::{self, HeightGrid};
 use super::{Contents, HeightScale, MeshIoError, Receiver};

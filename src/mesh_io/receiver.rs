@@ -2,7 +2,7 @@
 
 use std::io;
 
-use vertex_tree::DegreeMap;
+use container::DegreeMap;
 
 /// Takes the vertices and triangles of a mesh in order. A triangle names vertices that have been taken before it.
 pub trait Receiver {

@@ -14,12 +14,13 @@ use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use std::time::Duration;
 
+use collapse_log::LogError;
 use detail_block::XfmTree;
 use in_memory::InMemoryTree;
 use meta_node::MetaNodeTree;
 use mt_partition::{Memory, MtTree, Reader};
 use rustc_hash::FxHashMap;
-use vertex_tree::{LogError, NullSink, TreeError, VertexTree};
+use vertex_tree::{NullSink, TreeError, VertexTree};
 
 use super::any::{AnyObject, StoredObjects};
 use super::scene_file::read_lines;

@@ -50,7 +50,7 @@ mod trajectory;
 
 use std::path::Path as FilePath;
 
-use vertex_tree::Mesh;
+use collapse_log::Mesh;
 
 pub use error::{ImportError, Warning};
 

@@ -46,10 +46,10 @@ use std::path::{Path, PathBuf};
 use std::sync::atomic::AtomicBool;
 use std::time::Instant;
 
-use vertex_tree::external::Scratch;
-use vertex_tree::{
-    Bounds, Collapse, DegreeMap, Georeference, LogCounts, LogError, LogFileError, NONE, write_log_from,
-};
+use collapse_log::external::Scratch;
+use collapse_log::{Collapse, LogCounts, LogError, LogFileError, write_log_from};
+use container::{DegreeMap, Georeference};
+use vertex_tree::{Bounds, NONE};
 
 use super::key_counts::KeyCounts;
 use super::{Options, Report};

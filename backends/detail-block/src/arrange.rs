@@ -2,7 +2,9 @@
 
 use std::io;
 
-use vertex_tree::{Georeference, LogSource, NONE};
+use collapse_log::LogSource;
+use container::Georeference;
+use vertex_tree::NONE;
 
 use crate::build::{BuildOptions, WriteReport};
 use crate::error::{Failure, XfmError};

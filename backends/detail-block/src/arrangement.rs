@@ -5,7 +5,8 @@ use std::cmp::Reverse;
 use std::io::{self, Cursor, Write};
 use std::path::Path;
 
-use vertex_tree::{Collapse, CollapseLog, Mesh, NormalCone};
+use collapse_log::{Collapse, CollapseLog, Mesh};
+use vertex_tree::NormalCone;
 
 use crate::arrange::Arranged;
 use crate::build::{BuildOptions, WriteReport};

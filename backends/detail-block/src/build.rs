@@ -8,8 +8,8 @@
 use std::path::Path;
 use std::sync::atomic::Ordering;
 
-use vertex_tree::external::Workspace;
-use vertex_tree::{CollapseLog, LogSource};
+use collapse_log::external::Workspace;
+use collapse_log::{CollapseLog, LogSource};
 
 use crate::arrange::Arranged;
 use crate::error::XfmError;

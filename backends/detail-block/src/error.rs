@@ -3,8 +3,8 @@
 use std::io;
 use std::path::{Path, PathBuf};
 
-use vertex_tree::LogError;
-use vertex_tree::sections::SectionError;
+use collapse_log::LogError;
+use container::SectionError;
 
 /// An XFM file could not be written or is not what it should be.
 #[derive(Debug, thiserror::Error)]

@@ -25,7 +25,7 @@
 //!    136      8  length of the file
 //!    144      4  CRC-32 of bytes 0 to 143
 //!    148      4  zeros
-//!    152         table of sections, see `vertex_tree::sections`:
+//!    152         table of sections, see `container`:
 //!                GEOR  where the mesh lies in the world, if that is to be said
 //!                BASV  24 V, initial vertices: position and normal, 3 f32 each
 //!                BAST  24 F, initial faces: three initial vertices, and the reverses of the half-edges that start there

@@ -6,7 +6,8 @@
 //! # use std::sync::Arc;
 //! # use detail_block::{BuildOptions, Settings, XfmFile, XfmTree};
 //! # use vertex_tree::source::FileSource;
-//! # use vertex_tree::{CollapseLog, NullSink, VertexTree};
+//! # use collapse_log::CollapseLog;
+//! # use vertex_tree::{NullSink, VertexTree};
 //! # fn main() -> Result<(), Box<dyn std::error::Error>> {
 //! # let (log, folder) = (CollapseLog::default(), tempfile::tempdir()?);
 //! # let path = &folder.path().join("empty.xfm");
@@ -60,10 +61,10 @@ mod writing;
 
 pub use arrangement::Arrangement;
 pub use build::{BuildOptions, WriteReport, needed_bytes, needed_disk_bytes, write, write_within};
+pub use collapse_log::external::Workspace;
 pub use error::XfmError;
 pub use file::XfmFile;
 pub use format::MAGIC;
 pub use paging::{ATTEMPTS, PagingCounts, SOON};
 pub use settings::{Io, Settings};
 pub use tree::XfmTree;
-pub use vertex_tree::external::Workspace;

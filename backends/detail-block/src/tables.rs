@@ -1,7 +1,7 @@
 //! Reading all that comes with the header: everything but the blocks.
 
-use vertex_tree::Georeference;
-use vertex_tree::sections::{BY_PAGE, Kind, SectionError, Sections};
+use container::Georeference;
+use container::{BY_PAGE, Kind, SectionError, Sections};
 use vertex_tree::source::PageSource;
 
 use crate::error::XfmError;

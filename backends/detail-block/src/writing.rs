@@ -5,8 +5,9 @@
 use std::io::{self, Seek, Write};
 use std::path::Path;
 
-use vertex_tree::sections::{self, BY_PAGE, Kind, SectionWriter};
-use vertex_tree::{Georeference, NONE, NodeId, output};
+use container::{BY_PAGE, Kind, SectionWriter};
+use container::{Georeference, output};
+use vertex_tree::{NONE, NodeId};
 
 use crate::arrange::Arranged;
 use crate::build::WriteReport;
@@ -195,7 +196,7 @@ const KINDS: [(Kind, u32); 5] = [
 /// How long the file with a header and so many bytes of blocks will be.
 pub(crate) fn length(header: &Header, blocks: u64, georeference: &Georeference) -> io::Result<u64> {
     let [vertices, faces, roots, index] = header.table_bytes();
-    sections::file_length(HEADER_BYTES, georeference, &[], &[vertices, faces, roots, blocks, index])
+    container::file_length(HEADER_BYTES, georeference, &[], &[vertices, faces, roots, blocks, index])
 }
 
 fn put(out: &mut impl Write, words: &[u32]) -> Result<(), Failure> {

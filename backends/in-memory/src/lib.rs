@@ -1,7 +1,8 @@
 //! The reference backend: the whole hierarchy resident, nothing clever.
 //!
 //! ```
-//! # use vertex_tree::{CollapseLog, NullSink, VertexTree};
+//! # use collapse_log::CollapseLog;
+//! # use vertex_tree::{NullSink, VertexTree};
 //! # use in_memory::{Hierarchy, InMemoryTree};
 //! # use std::sync::Arc;
 //! # fn main() -> Result<(), Box<dyn std::error::Error>> {

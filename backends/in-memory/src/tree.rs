@@ -2,9 +2,9 @@
 
 use std::sync::Arc;
 
+use star_mesh::{LeafTriangle, StarMesh};
 use vertex_tree::{
-    Bounds, LeafTriangle, MeshSink, NONE, NodeId, PageStats, StarMesh, Step, TreeError, TriangleId, VertexId,
-    VertexTree, prefetch,
+    Bounds, MeshSink, NONE, NodeId, PageStats, Step, TreeError, TriangleId, VertexId, VertexTree, prefetch,
 };
 
 use crate::Hierarchy;

@@ -3,7 +3,7 @@
 //!
 //! Leaves are numbered in the order in which a walk in preorder meets them, the child with the kept vertex first, so
 //! that every subtree is an interval of leaves and the vertex shown for a folded node is its first leaf (design of the
-//! displayed mesh: [`StarMesh`](vertex_tree::StarMesh)). Nodes are numbered in preorder too: those below a node with `k`
+//! displayed mesh: [`StarMesh`](star_mesh::StarMesh)). Nodes are numbered in preorder too: those below a node with `k`
 //! leaves are the `k - 2` after it, and where its children are follows from how many leaves they have.
 //!
 //! The nodes, their triangles and the places of the leaves are in temporary files, and read by number through a cache; how
@@ -14,8 +14,9 @@ use std::io;
 use std::ops::Range;
 use std::sync::atomic::{AtomicBool, Ordering};
 
-use vertex_tree::external::{Paged, Scratch, Workspace, check_stop};
-use vertex_tree::{Bounds, LogSource};
+use collapse_log::LogSource;
+use collapse_log::external::{Paged, Scratch, Workspace, check_stop};
+use vertex_tree::Bounds;
 
 use crate::arranging::{Arranging, Failure};
 use crate::error::MetaNodeError;

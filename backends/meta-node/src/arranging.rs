@@ -10,8 +10,9 @@ use std::io;
 use std::ops::Range;
 use std::sync::atomic::AtomicBool;
 
-use vertex_tree::external::{Scratch, Sorter, Spool, check_stop};
-use vertex_tree::{Bounds, Collapse, LogError, LogSource, NONE};
+use collapse_log::external::{Scratch, Sorter, Spool, check_stop};
+use collapse_log::{Collapse, LogError, LogSource};
+use vertex_tree::{Bounds, NONE};
 
 use crate::arrange::{Arrangement, Stored};
 use crate::subtree::{Span, Subtree};

@@ -20,7 +20,7 @@
 //!     64      8  bytes of all pages
 //!     72      4  0
 //!     76      4  CRC-32 of bytes 0 to 75
-//!     80         table of sections, see `vertex_tree::sections`:
+//!     80         table of sections, see `container`:
 //!                GEOR  where the mesh lies in the world, if that is to be said
 //!                ROOT  28 R, roots: number, number in the log, centre, radius, error
 //!                BASV  16 W, vertices of the base mesh: leaf, place

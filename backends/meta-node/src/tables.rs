@@ -1,7 +1,7 @@
 //! Where the parts of a file are, and what is read of them at once: all but the pages.
 
-use vertex_tree::Georeference;
-use vertex_tree::sections::{BY_PAGE, Kind, SectionError, Sections};
+use container::Georeference;
+use container::{BY_PAGE, Kind, SectionError, Sections};
 use vertex_tree::source::PageSource;
 
 use crate::error::MetaNodeError;

@@ -5,9 +5,11 @@ use std::io::{self, Write};
 use std::path::Path;
 use std::sync::atomic::{AtomicBool, Ordering};
 
-use vertex_tree::external::Workspace;
-use vertex_tree::sections::{BY_PAGE, Kind, SectionWriter};
-use vertex_tree::{CollapseLog, Georeference, LogSource, NONE, output};
+use collapse_log::external::Workspace;
+use collapse_log::{CollapseLog, LogSource};
+use container::{BY_PAGE, Kind, SectionWriter};
+use container::{Georeference, output};
+use vertex_tree::NONE;
 
 use crate::arrange::{Arrangement, Node};
 use crate::blocking::{self, Blocking};

@@ -4,10 +4,11 @@ mod common;
 
 use std::sync::Arc;
 
+use collapse_log::{Collapse, CollapseLog};
 use common::{bytes, open, random_log};
 use meta_node::{BuildOptions, MAGIC, MetaNodeError, MetaNodeFile};
+use vertex_tree::Bounds;
 use vertex_tree::source::MemorySource;
-use vertex_tree::{Bounds, Collapse, CollapseLog};
 
 fn options(levels: u32, page_bytes: u32) -> BuildOptions {
     BuildOptions { levels: Some(levels), page_bytes }

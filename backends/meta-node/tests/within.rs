@@ -5,9 +5,9 @@ mod common;
 use std::path::Path;
 use std::sync::atomic::AtomicBool;
 
+use collapse_log::{CollapseLog, LogError, LogFile, LogSource, write_log};
 use common::{bytes, open, random_log};
 use meta_node::{BuildOptions, MetaNodeError, Workspace, write_within};
-use vertex_tree::{CollapseLog, LogError, LogFile, LogSource, write_log};
 
 static RUNNING: AtomicBool = AtomicBool::new(false);
 

@@ -27,8 +27,10 @@ use std::io;
 use std::path::Path;
 use std::sync::atomic::{AtomicBool, Ordering};
 
-use vertex_tree::external::{Scratch, Workspace, check_stop};
-use vertex_tree::{CollapseLog, LogCounts, LogError, LogSource, NONE, output};
+use collapse_log::external::{Scratch, Workspace, check_stop};
+use collapse_log::{CollapseLog, LogCounts, LogError, LogSource};
+use container::output;
+use vertex_tree::NONE;
 
 use crate::{BuildOptions, MtError};
 use arranging::Arranged;

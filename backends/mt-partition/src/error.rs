@@ -3,8 +3,8 @@
 use std::io;
 use std::path::PathBuf;
 
-use vertex_tree::LogError;
-use vertex_tree::sections::SectionError;
+use collapse_log::LogError;
+use container::SectionError;
 
 /// A file could not be written, opened or read.
 #[derive(Debug, thiserror::Error)]

@@ -2,9 +2,10 @@
 
 use std::sync::Arc;
 
-use vertex_tree::sections::Sections;
+use container::Georeference;
+use container::Sections;
 use vertex_tree::source::PageSource;
-use vertex_tree::{Bounds, Georeference, NONE, NodeId};
+use vertex_tree::{Bounds, NONE, NodeId};
 
 use crate::MtError;
 use crate::format::{Header, NODE, PARTITION, ROOT};

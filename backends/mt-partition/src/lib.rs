@@ -4,7 +4,8 @@
 //! ```
 //! # use std::sync::Arc;
 //! # use vertex_tree::source::FileSource;
-//! # use vertex_tree::{CollapseLog, NullSink, VertexTree};
+//! # use collapse_log::CollapseLog;
+//! # use vertex_tree::{NullSink, VertexTree};
 //! # use mt_partition::{BuildOptions, MtFile, MtTree, Settings, write};
 //! # fn main() -> Result<(), Box<dyn std::error::Error>> {
 //! # let folder = tempfile::tempdir()?;
@@ -51,6 +52,7 @@ mod verify;
 
 pub use build::{LEAST_MEMORY, WriteReport, write, write_within};
 pub use cache::CacheMode;
+pub use collapse_log::external::Workspace;
 pub use error::MtError;
 pub use file::{MtFile, StoredNode};
 pub use format::MAGIC;
@@ -58,7 +60,6 @@ pub use memory::Memory;
 pub use partition::QueueOrder;
 pub use reader::Reader;
 pub use tree::{MtTree, Settings};
-pub use vertex_tree::external::Workspace;
 
 /// How to build a file.
 #[derive(Clone, Copy, Debug, PartialEq)]

@@ -1,8 +1,9 @@
 //! Reading header, tables and base mesh, of all versions.
 
-use vertex_tree::sections::{BY_PAGE, Kind, SectionError, Sections};
+use container::Georeference;
+use container::{BY_PAGE, Kind, SectionError, Sections};
+use vertex_tree::NONE;
 use vertex_tree::source::PageSource;
-use vertex_tree::{Georeference, NONE};
 
 use crate::MtError;
 use crate::format::{CHECKSUM, HEADER, Header, MAGIC, VERSION};

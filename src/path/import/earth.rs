@@ -2,8 +2,8 @@
 
 use std::f64::consts::PI;
 
+use container::DegreeMap;
 use glam::DVec3;
-use vertex_tree::DegreeMap;
 
 use super::ImportError;
 use crate::path::format::Line;

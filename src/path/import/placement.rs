@@ -2,8 +2,8 @@
 
 use std::f64::consts::PI;
 
+use collapse_log::Mesh;
 use glam::{DQuat, DVec2, DVec3};
-use vertex_tree::Mesh;
 
 use super::axes::{QUARTER, look};
 use super::envelope::Envelope;

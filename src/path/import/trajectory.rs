@@ -2,8 +2,8 @@
 
 use std::path::Path as FilePath;
 
+use container::DegreeMap;
 use glam::{DQuat, DVec3};
-use vertex_tree::DegreeMap;
 
 use super::{ImportError, Warning, hoppe, table};
 use crate::path::format::Line;

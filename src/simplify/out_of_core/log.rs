@@ -3,7 +3,7 @@
 use std::io;
 use std::ops::Range;
 
-use vertex_tree::external::{Scratch, Sorter, Spool};
+use collapse_log::external::{Scratch, Sorter, Spool};
 
 use super::super::Round;
 use super::super::rounds::Builder;

@@ -3,9 +3,10 @@
 use std::collections::HashMap;
 use std::hash::BuildHasherDefault;
 
+use collapse_log::Collapse;
 use glam::Vec3;
 use rustc_hash::FxHasher;
-use vertex_tree::{Bounds, Collapse, NONE};
+use vertex_tree::{Bounds, NONE};
 
 use super::super::candidates::{Parity, State};
 use super::super::nodes::Nodes;

@@ -9,10 +9,10 @@ use std::io;
 use std::ops::Range;
 use std::sync::atomic::{AtomicBool, Ordering};
 
+use collapse_log::external::Sorter;
 use parking_lot::Mutex;
 use rustc_hash::FxHashSet;
 use vertex_tree::NONE;
-use vertex_tree::external::Sorter;
 
 use super::super::key_counts::KeyCounts;
 use super::super::order::PIECES;

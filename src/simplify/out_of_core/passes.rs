@@ -3,9 +3,9 @@
 use std::io;
 use std::sync::atomic::{AtomicBool, Ordering};
 
+use collapse_log::external::{Scratch, Sorter};
 use parking_lot::Mutex;
 use vertex_tree::NONE;
-use vertex_tree::external::{Scratch, Sorter};
 
 use super::super::candidates::Parity;
 use super::super::key_counts::KeyCounts;

@@ -5,9 +5,10 @@
 
 use std::io;
 
+use collapse_log::external::{Scratch, Sorter, Spool};
+use container::{Georeference, Rounding};
 use glam::Vec3;
-use vertex_tree::external::{Scratch, Sorter, Spool};
-use vertex_tree::{Georeference, NONE, Rounding};
+use vertex_tree::NONE;
 
 use super::super::is_flat;
 use super::super::spatial_order::Curve;

@@ -4,8 +4,9 @@ use std::io;
 use std::path::Path;
 use std::sync::atomic::AtomicBool;
 
+use collapse_log::{Collapse, CollapseLog, LogCounts, LogSource, Mesh, Records};
+use container::Georeference;
 use detail_block::{Arrangement, BuildOptions, Workspace, XfmError, needed_bytes, write_within};
-use vertex_tree::{Collapse, CollapseLog, Georeference, LogCounts, LogSource, Mesh, Records};
 
 use crate::driver::bytes_of;
 use crate::meshes::{Random, grid, random_log, rubble, torus};

@@ -7,7 +7,7 @@
 
 use std::io;
 
-use vertex_tree::external::{Array, Paged, Sorter, Spool};
+use collapse_log::external::{Array, Paged, Sorter, Spool};
 use vertex_tree::{Bounds, NONE};
 
 use super::history::State;

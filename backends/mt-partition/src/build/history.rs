@@ -3,8 +3,9 @@
 use std::io;
 
 use bytemuck::{Pod, Zeroable};
-use vertex_tree::external::{Array, Sorter, Spool};
-use vertex_tree::{LogError, NONE, z_order};
+use collapse_log::external::{Array, Sorter, Spool};
+use collapse_log::{LogError, z_order};
+use vertex_tree::NONE;
 
 use super::{Failure, Work};
 use crate::reduce::reach;

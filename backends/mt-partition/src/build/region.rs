@@ -2,8 +2,8 @@
 
 use std::io;
 
+use collapse_log::external::Array;
 use vertex_tree::NONE;
-use vertex_tree::external::Array;
 
 use super::Work;
 use super::history::State;

@@ -3,9 +3,10 @@
 use std::collections::BTreeMap;
 use std::sync::atomic::AtomicBool;
 
+use collapse_log::external::Scratch;
+use collapse_log::{Collapse, CollapseLog, Mesh};
 use proptest::prelude::*;
-use vertex_tree::external::Scratch;
-use vertex_tree::{Bounds, Collapse, CollapseLog, Mesh, NONE};
+use vertex_tree::{Bounds, NONE};
 
 use super::history::History;
 use super::{LEAST_MEMORY, Work, versions};

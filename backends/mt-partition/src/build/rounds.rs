@@ -16,8 +16,8 @@
 
 use std::io;
 
+use collapse_log::external::{Array, Sorter, Spool};
 use vertex_tree::NONE;
-use vertex_tree::external::{Array, Sorter, Spool};
 
 use super::history::{History, State};
 use super::region::Region;

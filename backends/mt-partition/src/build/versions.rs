@@ -17,8 +17,8 @@
 
 use std::io;
 
+use collapse_log::external::{Array, Sorter, Spool};
 use vertex_tree::NONE;
-use vertex_tree::external::{Array, Sorter, Spool};
 
 use super::history::{Fate, History};
 use super::rounds::{Arcs, Collecting};

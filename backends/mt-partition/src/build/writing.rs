@@ -6,8 +6,8 @@
 use std::fs::File;
 use std::io::{self, Write};
 
-use vertex_tree::external::{Array, Paged, Reader, Sorter, Spool};
-use vertex_tree::sections::{BY_PAGE, Kind, SectionWriter};
+use collapse_log::external::{Array, Paged, Reader, Sorter, Spool};
+use container::{BY_PAGE, Kind, SectionWriter};
 use vertex_tree::{Bounds, NONE};
 
 use super::arranging::{Arranged, bounds_of};
