@@ -3,6 +3,8 @@
 //!
 //! Sources are taken as tokens: what stands in comments is none of it.
 
+mod circles;
+
 use std::collections::HashSet;
 use std::fs;
 use std::path::Path;
