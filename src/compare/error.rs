@@ -3,7 +3,7 @@
 use collapse_log::LogError;
 use vertex_tree::TreeError;
 
-use super::Loading;
+use super::loading::Loading;
 use crate::criterion::Criterion;
 use crate::objects::StoredSceneError;
 use crate::oracle::Difference;

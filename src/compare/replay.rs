@@ -6,7 +6,10 @@ use std::time::{Duration, Instant};
 use rustc_hash::FxHashSet;
 use vertex_tree::{MeshSink, NodeId, NullSink, VertexTree};
 
-use super::{Check, CompareError, Opening, Pace, Row, Subject, WrongCut};
+use super::error::{CompareError, WrongCut};
+use super::opening::Opening;
+use super::options::Pace;
+use super::{Check, Row, Subject};
 use crate::active_mesh::ActiveMesh;
 use crate::engine::{Engine, FrameReport, Settings};
 use crate::path::Path;

@@ -4,7 +4,7 @@ use std::io;
 
 use container::{DegreeMap, Georeference, Rounding};
 
-use super::Receiver;
+use super::receiver::Receiver;
 use super::rounding::{Bounds, Placing, exact};
 use crate::Mesh;
 use crate::edge_lengths::EdgeLengths;

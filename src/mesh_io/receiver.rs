@@ -28,3 +28,9 @@ pub trait Receiver {
     /// how degrees have been laid on a plane. At most once, at any time.
     fn georeference(&mut self, coordinate_system: &str, degrees: Option<DegreeMap>);
 }
+
+/// What a file is found to hold.
+pub(super) struct Contents {
+    /// Whether it has faces, or anything else that joins vertices, be it without surface.
+    pub faces: bool,
+}

@@ -23,8 +23,9 @@ use rustc_hash::FxHashMap;
 use vertex_tree::{NullSink, TreeError, VertexTree};
 
 use super::any::{AnyObject, StoredObjects};
+use super::scene_file::SceneFileError;
 use super::scene_file::read_lines;
-use super::{Object, Placement, SceneFileError};
+use super::{Object, Placement};
 use crate::brute_force::BruteForce;
 use crate::engine::{FrameReport, Settings};
 use crate::mesh_io::{self, MeshIoError};

@@ -3,7 +3,7 @@
 use collapse_log::Mesh;
 use glam::DVec3;
 
-use super::{Path, Pose};
+use super::walkthrough::{Path, Pose};
 use crate::view::{Camera, ViewError, check_eye};
 
 const FRAMES: usize = 720;

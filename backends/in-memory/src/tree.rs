@@ -7,7 +7,7 @@ use vertex_tree::{
     Bounds, MeshSink, NONE, NodeId, PageStats, Step, TreeError, TriangleId, VertexId, VertexTree, prefetch,
 };
 
-use crate::Hierarchy;
+use super::hierarchy::Hierarchy;
 use crate::hierarchy::Node;
 
 /// A hierarchy and the state of one front through it.

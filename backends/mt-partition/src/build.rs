@@ -32,7 +32,8 @@ use collapse_log::{CollapseLog, LogCounts, LogError, LogSource};
 use container::output;
 use vertex_tree::NONE;
 
-use crate::{BuildOptions, MtError};
+use super::error::MtError;
+use crate::BuildOptions;
 use arranging::Arranged;
 use history::History;
 use rounds::Rounds;

@@ -7,7 +7,7 @@ use container::Sections;
 use vertex_tree::source::PageSource;
 use vertex_tree::{Bounds, NONE, NodeId};
 
-use crate::MtError;
+use super::error::MtError;
 use crate::format::{Header, NODE, PARTITION, ROOT};
 use crate::opening::{Opener, words};
 use crate::record::{Limits, Record};

@@ -5,7 +5,7 @@ use container::{BY_PAGE, Kind, SectionError, Sections};
 use vertex_tree::NONE;
 use vertex_tree::source::PageSource;
 
-use crate::MtError;
+use super::error::MtError;
 use crate::format::{CHECKSUM, HEADER, Header, MAGIC, VERSION};
 
 /// Reads while there is no file yet, and makes errors.

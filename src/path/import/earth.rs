@@ -5,7 +5,7 @@ use std::f64::consts::PI;
 use container::DegreeMap;
 use glam::DVec3;
 
-use super::ImportError;
+use super::error::ImportError;
 use crate::path::format::Line;
 
 /// Metres of the radius of a sphere with the earth's volume.

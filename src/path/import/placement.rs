@@ -7,8 +7,8 @@ use glam::{DQuat, DVec2, DVec3};
 
 use super::axes::{QUARTER, look};
 use super::envelope::Envelope;
+use super::options::{Mode, Up};
 use super::trajectory::Sample;
-use super::{Mode, Up};
 use crate::path::Pose;
 
 /// A mesh flatter than this part of its shorter side is terrain, and has z up if it is flat in z.

@@ -5,7 +5,7 @@ use std::ops::Range;
 
 use collapse_log::external::{Scratch, Sorter, Spool};
 
-use super::super::Round;
+use super::super::report::Round;
 use super::super::rounds::Builder;
 
 /// The collapses in order, on disk.

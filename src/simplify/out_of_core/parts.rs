@@ -12,8 +12,7 @@ use super::super::candidates::{Parity, State};
 use super::super::nodes::Nodes;
 use super::super::quadric::Quadric;
 use super::super::surface::Triangle;
-use super::blocks::{Blocks, Counts, NODE_WORDS, POINT_WORDS, TRIANGLE_WORDS, VERTEX_WORDS};
-use super::window::Ring;
+use super::blocks::{Blocks, Counts, NODE_WORDS, POINT_WORDS, Ring, TRIANGLE_WORDS, VERTEX_WORDS};
 
 type FastMap = HashMap<u32, u32, BuildHasherDefault<FxHasher>>;
 

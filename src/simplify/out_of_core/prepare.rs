@@ -10,7 +10,7 @@ use container::{Georeference, Rounding};
 use glam::Vec3;
 use vertex_tree::NONE;
 
-use super::super::is_flat;
+use super::super::initial::is_flat;
 use super::super::spatial_order::Curve;
 use super::blocks::{Blocks, VERTEX_WORDS, Words};
 use crate::edge_lengths::EdgeLengths;

@@ -14,9 +14,10 @@ use super::arranging::{Arranged, bounds_of};
 use super::history::Fate;
 use super::versions::follow;
 use super::{Failure, Work, WriteReport};
+use crate::BuildOptions;
 use crate::format::{HEADER, Header};
+use crate::partition::QueueOrder;
 use crate::record::{Draft, Patch};
-use crate::{BuildOptions, QueueOrder};
 
 /// Writes the file.
 pub(super) fn write(
