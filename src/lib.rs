@@ -62,6 +62,7 @@ pub mod active_mesh;
 pub mod brute_force;
 pub mod budget;
 pub mod bvh;
+mod carried;
 #[cfg(feature = "cli")]
 pub mod cli;
 #[cfg(feature = "cli")]
@@ -75,6 +76,7 @@ mod filter;
 mod foresight;
 pub mod front;
 mod frustum;
+pub mod in_play;
 pub mod mesh_io;
 pub mod motion;
 pub mod normal_cone;
@@ -97,6 +99,7 @@ pub mod simplify;
 #[cfg(all(feature = "in-memory", feature = "meta-node", feature = "detail-block", feature = "mt-partition"))]
 pub mod store;
 pub mod view;
+mod waiting;
 
 pub use collapse_log;
 pub use collapse_log::{Collapse, CollapseLog, Mesh};

@@ -3,8 +3,7 @@
 use vertex_tree::{Bounds, MeshSink, VertexTree};
 
 use super::Engine;
-use crate::front::Slot;
-use crate::queue::Kind;
+use crate::in_play::{Kind, Slot};
 use crate::refine::Finder;
 
 impl<T: VertexTree, M: MeshSink> Engine<T, M> {

@@ -10,21 +10,20 @@
 
 use std::collections::{BinaryHeap, VecDeque};
 
-use crate::front::Slot;
-use crate::queue::Kind;
+use crate::in_play::{Kind, Slot};
 
 /// Heaps of a kind. A change is on that of its slot, modulo this: which one does not depend on the strategy.
-pub(super) const HEAPS: usize = 64;
+pub const HEAPS: usize = 64;
 
 /// The heaps that are looked at anew in a frame.
-pub(super) const A_FRAME: usize = 8;
+pub const A_FRAME: usize = 8;
 
 /// After so many frames in which the views have moved, the turn of every heap has come.
 const OLDEST: usize = HEAPS / A_FRAME;
 
 /// An entry. The most urgent one is the greatest.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
-pub(super) struct Urgent {
+pub struct Urgent {
     /// Bits of a number that is not negative, which are in the same order.
     urgency: u64,
     pub slot: Slot,
@@ -61,7 +60,7 @@ pub(crate) struct Carried {
     turn: usize,
     seen: [u64; HEAPS],
     /// Frames, for what has its turn in some of them.
-    pub(super) frame: u64,
+    pub frame: u64,
 }
 
 impl Default for Carried {
@@ -114,7 +113,7 @@ impl Carried {
     }
 
     /// Starts a frame, in which the views may have moved.
-    pub(super) fn begin_frame(&mut self, moved: bool) {
+    pub fn begin_frame(&mut self, moved: bool) {
         self.frame += 1;
         if moved {
             self.moves.rotate_right(1);
@@ -133,14 +132,14 @@ impl Carried {
     }
 
     /// A change has been found, and waits from now on. How urgent it is is asked for later.
-    pub(super) fn expect(&mut self, kind: Kind, slot: Slot) {
+    pub fn expect(&mut self, kind: Kind, slot: Slot) {
         let ticket = self.give_ticket(slot);
         self.line(kind).coming.push_back((slot, ticket));
     }
 
     /// The change that has been waiting for its place on a heap for longest, and whether it was found in these views. It waits
     /// no more, unless it is [put](Self::put) there.
-    pub(super) fn next_coming(&mut self, kind: Kind) -> Option<(Slot, bool)> {
+    pub fn next_coming(&mut self, kind: Kind) -> Option<(Slot, bool)> {
         while let Some((slot, ticket)) = self.line(kind).coming.pop_front() {
             if self.is_valid(slot, ticket) {
                 self.take(slot);
@@ -151,7 +150,7 @@ impl Carried {
     }
 
     /// Puts a change where it waits for its turn; `urgency` is that in the views of this frame, and not negative.
-    pub(super) fn put(&mut self, kind: Kind, slot: Slot, urgency: f64) {
+    pub fn put(&mut self, kind: Kind, slot: Slot, urgency: f64) {
         let ticket = self.give_ticket(slot);
         let entry = Urgent { urgency: urgency.max(0.0).to_bits(), slot, ticket };
         let heap = &mut self.line(kind).heaps[slot.index() % HEAPS];
@@ -163,7 +162,7 @@ impl Carried {
     }
 
     /// Takes out the most urgent change.
-    pub(super) fn pop(&mut self, kind: Kind) -> Option<Urgent> {
+    pub fn pop(&mut self, kind: Kind) -> Option<Urgent> {
         loop {
             let heaps = &mut self.line(kind).heaps;
             let tops = heaps.iter().enumerate().filter_map(|(at, heap)| Some((*heap.peek()?, at)));
@@ -177,7 +176,7 @@ impl Carried {
     }
 
     /// Takes out the most urgent of the changes of which each is the most urgent on its heap and was looked at in these views.
-    pub(super) fn pop_current(&mut self, kind: Kind) -> Option<Urgent> {
+    pub fn pop_current(&mut self, kind: Kind) -> Option<Urgent> {
         loop {
             let before = self.moves[0];
             let heaps = &mut self.line(kind).heaps;
@@ -196,18 +195,18 @@ impl Carried {
     }
 
     /// Whether the views have not moved since an entry's urgency was computed.
-    pub(super) fn is_current(&self, entry: &Urgent) -> bool {
+    pub fn is_current(&self, entry: &Urgent) -> bool {
         entry.ticket > self.moves[0]
     }
 
     /// Whether they have more than [`OLDEST`] times: its heap's turn has not come for want of time.
-    pub(super) fn is_old(&self, entry: &Urgent) -> bool {
+    pub fn is_old(&self, entry: &Urgent) -> bool {
         entry.ticket <= self.moves[OLDEST - 1]
     }
 
     /// The next heap is looked at anew. For each kind calls `rate` with the slots of what waits on it since before the views
     /// moved, which gives its urgency now, or `None` if it is not wanted any more and waits no longer.
-    pub(super) fn look_anew(&mut self, mut rate: impl FnMut(Kind, Slot) -> Option<f64>) {
+    pub fn look_anew(&mut self, mut rate: impl FnMut(Kind, Slot) -> Option<f64>) {
         let at = self.turn;
         self.turn = (at + 1) % HEAPS;
         if std::mem::replace(&mut self.seen[at], self.moves[0]) == self.moves[0] {
@@ -234,7 +233,7 @@ impl Carried {
     }
 
     /// Takes out every change, in no order, and calls `f` with each.
-    pub(super) fn drain(&mut self, mut f: impl FnMut(Kind, Slot)) {
+    pub fn drain(&mut self, mut f: impl FnMut(Kind, Slot)) {
         for kind in [Kind::Fold, Kind::Unfold] {
             while let Some((slot, _)) = self.next_coming(kind) {
                 f(kind, slot);
@@ -264,7 +263,7 @@ impl Carried {
     /// # Panics
     /// If not.
     #[track_caller]
-    pub(super) fn assert_well_formed(&self) {
+    pub fn assert_well_formed(&self) {
         let mut entries = 0;
         self.for_each(|_, _| entries += 1);
         let tickets = self.tickets.iter().filter(|&&ticket| ticket != 0).count();
