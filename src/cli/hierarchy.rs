@@ -12,8 +12,8 @@ use serde_json::json;
 use super::arguments::{Build, Info, Verify};
 use super::destination::{Content, check_file};
 use super::input::Input;
-use super::print;
 use super::progress::stage;
+use super::say::{print, warn};
 use crate::mesh_io::{self, ReadOptions, Receiver};
 use crate::progress::Progress;
 use crate::simplify;
@@ -123,7 +123,7 @@ const HUNDREDTH: usize = 100;
 fn warn_of_rounding(georeference: &Georeference) {
     let rounding = georeference.rounding;
     if let Some(share) = rounding.share().filter(|share| share * HUNDREDTH as f64 > 1.0) {
-        super::warn(&format!(
+        warn(&format!(
             "32 bits about the middle do not hold the coordinates: they move by up to {}, which is {share:.2} of the median edge",
             rounding.largest_move
         ));

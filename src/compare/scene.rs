@@ -8,7 +8,7 @@ use std::ops::Range;
 use super::error::CompareError;
 use super::opening::Opening;
 use super::options::{Options, Pace};
-use super::{Row, Run};
+use super::run::{Row, Run};
 use crate::objects::StoredScene;
 use crate::path::Path;
 use crate::progress::Progress;
