@@ -55,6 +55,10 @@
 //! Parents have lower numbers than their children, and blocks than their child blocks, so walks upwards end even in a
 //! damaged file. Half-edge numbers: see `numbering`.
 
+use std::io;
+
+use container::Georeference;
+
 use crate::numbering::Levels;
 use crate::quantize::Scale;
 
@@ -129,6 +133,12 @@ impl Header {
             let fits = rest == 0 && (1..=u64::from(self.levels.full())).contains(&count);
             fits.then_some((count as u32, is_leaf))
         })
+    }
+
+    /// How long the file will be with so many bytes of blocks.
+    pub fn file_length(&self, blocks: u64, georeference: &Georeference) -> io::Result<u64> {
+        let [vertices, faces, roots, index] = self.table_bytes();
+        container::file_length(HEADER_BYTES, georeference, &[], &[vertices, faces, roots, blocks, index])
     }
 
     pub fn encode(&self) -> Vec<u8> {

@@ -12,14 +12,11 @@
 use std::cell::RefCell;
 use std::io;
 use std::ops::Range;
-use std::sync::atomic::{AtomicBool, Ordering};
+use std::sync::atomic::AtomicBool;
 
-use collapse_log::LogSource;
-use collapse_log::external::{Paged, Scratch, Workspace, check_stop};
+use collapse_log::external::{Paged, check_stop};
 use vertex_tree::Bounds;
 
-use crate::arranging::{Arranging, Failure};
-use crate::error::MetaNodeError;
 use crate::subtree::Span;
 
 /// A node.
@@ -63,19 +60,7 @@ pub(crate) struct Stored {
     pub failed: Option<io::Error>,
 }
 
-impl<'a> Arrangement<'a> {
-    /// Arranges a log.
-    pub fn new(log: &dyn LogSource, workspace: &Workspace<'a>) -> Result<Self, MetaNodeError> {
-        let scratch = Scratch { folder: workspace.folder.clone() };
-        let memory = usize::try_from(workspace.memory).unwrap_or(usize::MAX) / 4;
-        let arranging = Arranging { log, scratch, memory, base_leaves: Vec::new(), stop: workspace.stop };
-        arranging.run().map_err(|error| match error {
-            Failure::Log(error) => error.into(),
-            Failure::Io(_) if workspace.stop.load(Ordering::Relaxed) => MetaNodeError::Interrupted,
-            Failure::Io(source) => MetaNodeError::Temporary { folder: workspace.folder.clone(), source },
-        })
-    }
-
+impl Arrangement<'_> {
     /// A node by its number in preorder.
     pub fn node(&self, n: u32) -> Node {
         let mut stored = self.stored.borrow_mut();

@@ -8,17 +8,33 @@
 use std::cell::RefCell;
 use std::io;
 use std::ops::Range;
-use std::sync::atomic::AtomicBool;
+use std::sync::atomic::{AtomicBool, Ordering};
 
-use collapse_log::external::{Scratch, Sorter, Spool, check_stop};
+use collapse_log::external::{Scratch, Sorter, Spool, Workspace, check_stop};
 use collapse_log::{Collapse, LogError, LogSource};
 use vertex_tree::{Bounds, NONE};
 
 use crate::arrange::{Arrangement, Stored};
+use crate::error::MetaNodeError;
 use crate::subtree::{Span, Subtree};
 
+/// Arranges a log.
+pub(crate) fn arrange<'a>(
+    log: &dyn LogSource,
+    workspace: &Workspace<'a>,
+) -> Result<Arrangement<'a>, MetaNodeError> {
+    let scratch = Scratch { folder: workspace.folder.clone() };
+    let memory = usize::try_from(workspace.memory).unwrap_or(usize::MAX) / 4;
+    let arranging = Arranging { log, scratch, memory, base_leaves: Vec::new(), stop: workspace.stop };
+    arranging.run().map_err(|error| match error {
+        Failure::Log(error) => error.into(),
+        Failure::Io(_) if workspace.stop.load(Ordering::Relaxed) => MetaNodeError::Interrupted,
+        Failure::Io(source) => MetaNodeError::Temporary { folder: workspace.folder.clone(), source },
+    })
+}
+
 /// What can go wrong.
-pub(crate) enum Failure {
+enum Failure {
     Log(LogError),
     Io(io::Error),
 }
@@ -52,18 +68,18 @@ impl Upper {
 }
 
 /// A log that is being arranged.
-pub(crate) struct Arranging<'a, 's> {
-    pub log: &'a dyn LogSource,
-    pub scratch: Scratch,
+struct Arranging<'a, 's> {
+    log: &'a dyn LogSource,
+    scratch: Scratch,
     /// Bytes that a sort, or what is loaded, may take.
-    pub memory: usize,
+    memory: usize,
     /// Empty at first.
-    pub base_leaves: Vec<u32>,
-    pub stop: &'s AtomicBool,
+    base_leaves: Vec<u32>,
+    stop: &'s AtomicBool,
 }
 
 impl<'s> Arranging<'_, 's> {
-    pub fn run(mut self) -> Result<Arrangement<'s>, Failure> {
+    fn run(mut self) -> Result<Arrangement<'s>, Failure> {
         let counts = self.log.counts();
         // Leaves below each vertex, then their places: one array for both.
         let mut leaves = vec![1_u32; counts.vertices as usize];

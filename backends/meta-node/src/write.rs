@@ -12,6 +12,7 @@ use container::{Georeference, output};
 use vertex_tree::NONE;
 
 use crate::arrange::{Arrangement, Node};
+use crate::arranging::arrange;
 use crate::blocking::{self, Blocking};
 use crate::error::MetaNodeError;
 use crate::format::{HEADER_BYTES, Header};
@@ -74,7 +75,7 @@ pub fn write_within(
     if let Some(levels) = options.levels.filter(|levels| !(1..=page::MOST_LEVELS).contains(levels)) {
         return Err(MetaNodeError::Levels { levels, most: page::MOST_LEVELS });
     }
-    let arrangement = Arrangement::new(log, workspace)?;
+    let arrangement = arrange(log, workspace)?;
     let levels = options.levels.unwrap_or_else(|| blocking::levels_for(&arrangement, options.page_bytes));
     let blocking = Blocking::new(&arrangement, levels, options.page_bytes);
     let (pages, slots) = (blocking.pages.len() as u64, 1 << blocking.slot_bits);

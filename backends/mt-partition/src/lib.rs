@@ -39,6 +39,7 @@ mod format;
 mod graph;
 mod memory;
 mod opening;
+mod options;
 mod order;
 mod paging;
 mod partition;
@@ -57,24 +58,7 @@ pub use error::MtError;
 pub use file::{MtFile, StoredNode};
 pub use format::MAGIC;
 pub use memory::Memory;
+pub use options::BuildOptions;
 pub use partition::QueueOrder;
 pub use reader::Reader;
 pub use tree::{MtTree, Settings};
-
-/// How to build a file.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct BuildOptions {
-    /// Nodes are merged until arcs hold so many triangles on average; 0 leaves the graph as it is.
-    pub patch: f64,
-    /// Nodes in a partition, at most. The paper advises 20 for one object, 50 to 100 for many.
-    pub partition: u32,
-    /// In which order partitions are merged.
-    pub order: QueueOrder,
-}
-
-impl Default for BuildOptions {
-    /// Patches of 10 triangles, partitions of 20 nodes.
-    fn default() -> Self {
-        Self { patch: 10.0, partition: 20, order: QueueOrder::default() }
-    }
-}

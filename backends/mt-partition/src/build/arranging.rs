@@ -10,12 +10,13 @@ use std::io;
 use collapse_log::external::{Array, Paged, Sorter, Spool};
 use vertex_tree::{Bounds, NONE};
 
+use super::arcs::{ARC_BYTES, NODE_BYTES};
 use super::history::State;
-use super::rounds::{ARC_BYTES, NODE_BYTES, Rounds};
-use super::{Failure, Work, too_few};
-use crate::BuildOptions;
+use super::rounds::Rounds;
+use super::work::{Failure, Work, too_few};
 use crate::bounds::around;
 use crate::graph::Graph;
+use crate::options::BuildOptions;
 use crate::partition::partitions;
 
 /// The graph as it will be written.

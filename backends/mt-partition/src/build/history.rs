@@ -7,7 +7,7 @@ use collapse_log::external::{Array, Sorter, Spool};
 use collapse_log::{LogError, z_order};
 use vertex_tree::NONE;
 
-use super::{Failure, Work};
+use super::work::{Failure, Work};
 use crate::reduce::reach;
 
 /// What becomes of a vertex.

@@ -9,7 +9,8 @@ use proptest::prelude::*;
 use vertex_tree::{Bounds, NONE};
 
 use super::history::History;
-use super::{LEAST_MEMORY, Work, versions};
+use super::work::Work;
+use super::{LEAST_MEMORY, versions};
 
 /// Triangles on each arc, given by the collapses above and below.
 fn replay(log: &CollapseLog) -> BTreeMap<[u32; 2], u32> {

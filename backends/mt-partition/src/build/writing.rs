@@ -12,10 +12,11 @@ use vertex_tree::{Bounds, NONE};
 
 use super::arranging::{Arranged, bounds_of};
 use super::history::Fate;
+use super::report::WriteReport;
 use super::versions::follow;
-use super::{Failure, Work, WriteReport};
-use crate::BuildOptions;
+use super::work::{Failure, Work, too_few};
 use crate::format::{HEADER, Header};
+use crate::options::BuildOptions;
 use crate::partition::QueueOrder;
 use crate::record::{Draft, Patch};
 
@@ -274,7 +275,7 @@ impl Records<'_, '_> {
     fn nodes_before(&mut self, end: u32) -> Result<(), Failure> {
         let (mut arcs, mut above) = (Vec::new(), Vec::new());
         while self.at < end {
-            let Some(node) = self.nodes.next() else { return Err(super::too_few().into()) };
+            let Some(node) = self.nodes.next() else { return Err(too_few().into()) };
             let [_, bounds @ .., layer] = node?;
             arcs.clear();
             above.clear();
