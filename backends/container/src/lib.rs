@@ -39,6 +39,7 @@
 //! | `ATTR` `INPV` | reserved: further attributes of vertices; the input's numbers of vertices |
 
 mod error;
+mod file_error;
 mod georeference;
 mod layout;
 pub mod output;
@@ -48,6 +49,7 @@ mod table;
 mod writer;
 
 pub use error::SectionError;
+pub use file_error::FileError;
 pub use georeference::{DegreeMap, Georeference, Rounding};
 pub use layout::MOST;
 pub use section::{BY_PAGE, Extra, Kind, NECESSARY, Section};

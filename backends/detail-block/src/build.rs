@@ -8,7 +8,7 @@
 use std::path::Path;
 use std::sync::atomic::Ordering;
 
-use collapse_log::external::Workspace;
+use collapse_log::external::{Workspace, WorkspaceError};
 use collapse_log::{CollapseLog, LogSource};
 
 use crate::arrange::Arranged;
@@ -28,7 +28,7 @@ pub fn write(path: &Path, log: &CollapseLog, options: &BuildOptions) -> Result<W
 /// Builds a file from a log that may be larger than memory. The file is the same whatever the memory.
 ///
 /// # Errors
-/// As for [`write()`], and [`XfmError::Source`], [`XfmError::Temporary`], [`XfmError::Interrupted`]. Nothing is left behind.
+/// As for [`write()`], and [`XfmError::Source`] and [`XfmError::Workspace`]. Nothing is left behind.
 pub fn write_within(
     path: &Path,
     log: &dyn LogSource,
@@ -41,8 +41,9 @@ pub fn write_within(
     } else {
         write_on(path, log, options, &Disk::new(workspace), &workspace.folder)
     };
-    outcome
-        .map_err(|error| if workspace.stop.load(Ordering::Relaxed) { XfmError::Interrupted } else { error })
+    outcome.map_err(|error| {
+        if workspace.stop.load(Ordering::Relaxed) { WorkspaceError::Interrupted.into() } else { error }
+    })
 }
 
 /// Bytes of memory with which a file of so many vertices and triangles is built without temporary files.

@@ -3,8 +3,7 @@
 use std::path::Path;
 use std::sync::Arc;
 
-use container::Georeference;
-use container::Sections;
+use container::{Georeference, Sections};
 use vertex_tree::source::{FileSource, MappedSource, PageSource};
 use vertex_tree::{Bounds, NodeId};
 

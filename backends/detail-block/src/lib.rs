@@ -63,7 +63,8 @@ mod writing;
 
 pub use arrangement::Arrangement;
 pub use build::{needed_bytes, needed_disk_bytes, write, write_within};
-pub use collapse_log::external::Workspace;
+pub use collapse_log::external::{Workspace, WorkspaceError};
+pub use container::FileError;
 pub use error::XfmError;
 pub use file::XfmFile;
 pub use format::MAGIC;

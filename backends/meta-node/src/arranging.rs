@@ -8,7 +8,7 @@
 use std::cell::RefCell;
 use std::io;
 use std::ops::Range;
-use std::sync::atomic::{AtomicBool, Ordering};
+use std::sync::atomic::AtomicBool;
 
 use collapse_log::external::{Scratch, Sorter, Spool, Workspace, check_stop};
 use collapse_log::{Collapse, LogError, LogSource};
@@ -28,8 +28,7 @@ pub(crate) fn arrange<'a>(
     let arranging = Arranging { log, scratch, memory, base_leaves: Vec::new(), stop: workspace.stop };
     arranging.run().map_err(|error| match error {
         Failure::Log(error) => error.into(),
-        Failure::Io(_) if workspace.stop.load(Ordering::Relaxed) => MetaNodeError::Interrupted,
-        Failure::Io(source) => MetaNodeError::Temporary { folder: workspace.folder.clone(), source },
+        Failure::Io(source) => workspace.error(source).into(),
     })
 }
 

@@ -47,7 +47,8 @@ mod verify;
 mod waiting;
 mod write;
 
-pub use collapse_log::external::Workspace;
+pub use collapse_log::external::{Workspace, WorkspaceError};
+pub use container::FileError;
 pub use dependencies::Dependencies;
 pub use error::MetaNodeError;
 pub use file::MetaNodeFile;

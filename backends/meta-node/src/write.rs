@@ -5,10 +5,9 @@ use std::io::{self, Write};
 use std::path::Path;
 use std::sync::atomic::{AtomicBool, Ordering};
 
-use collapse_log::external::Workspace;
+use collapse_log::external::{Workspace, WorkspaceError};
 use collapse_log::{CollapseLog, LogSource};
-use container::{BY_PAGE, Kind, SectionWriter};
-use container::{Georeference, output};
+use container::{BY_PAGE, Georeference, Kind, SectionWriter, output};
 use vertex_tree::NONE;
 
 use crate::arrange::{Arrangement, Node};
@@ -65,7 +64,7 @@ pub fn write(path: &Path, log: &CollapseLog, options: &BuildOptions) -> Result<W
 ///
 /// # Errors
 /// [`MetaNodeError::Log`], [`MetaNodeError::Levels`], [`MetaNodeError::TooLarge`], [`MetaNodeError::Io`],
-/// [`MetaNodeError::Temporary`], [`MetaNodeError::Interrupted`].
+/// [`MetaNodeError::Workspace`].
 pub fn write_within(
     path: &Path,
     log: &dyn LogSource,
@@ -89,7 +88,7 @@ pub fn write_within(
         arrangement.check()
     })
     .map_err(|source| match source {
-        _ if workspace.stop.load(Ordering::Relaxed) => MetaNodeError::Interrupted,
+        _ if workspace.stop.load(Ordering::Relaxed) => WorkspaceError::Interrupted.into(),
         source => MetaNodeError::Io { file: path.display().to_string(), offset: 0, length: 0, source },
     })?;
     Ok(WriteReport {

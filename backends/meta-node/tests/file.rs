@@ -6,7 +6,7 @@ use std::sync::Arc;
 
 use collapse_log::{Collapse, CollapseLog};
 use common::{bytes, open, random_log};
-use meta_node::{BuildOptions, MAGIC, MetaNodeError, MetaNodeFile};
+use meta_node::{BuildOptions, FileError, MAGIC, MetaNodeError, MetaNodeFile};
 use vertex_tree::Bounds;
 use vertex_tree::source::MemorySource;
 
@@ -129,7 +129,7 @@ fn every_truncated_file_is_refused() {
     }
     let mut longer = intact;
     longer.push(0);
-    assert!(matches!(open(longer), Err(MetaNodeError::Length { .. })));
+    assert!(matches!(open(longer), Err(MetaNodeError::File(FileError::Length { .. }))));
 }
 
 /// Words that lie, with checksums that agree with them: nothing panics, hangs or takes memory without end.

@@ -61,8 +61,8 @@ pub fn write(path: &Path, log: &CollapseLog, options: &BuildOptions) -> Result<W
 /// it has to for whoever opens the file.
 ///
 /// # Errors
-/// [`MtError::Log`] if the log does not fit its mesh, [`MtError::TooLarge`], [`MtError::Io`], [`MtError::Temporary`] and
-/// [`MtError::Interrupted`].
+/// [`MtError::Log`] if the log does not fit its mesh, [`MtError::TooLarge`], [`MtError::Io`] and
+/// [`MtError::Workspace`].
 pub fn write_within(
     path: &Path,
     log: &dyn LogSource,
@@ -77,9 +77,8 @@ pub fn write_within(
     let io = |source| MtError::Io { file: path.display().to_string(), offset: 0, length: 0, source };
     let name = |failure| match failure {
         Failure::Log(error) => error.into(),
-        _ if workspace.stop.load(Ordering::Relaxed) => MtError::Interrupted,
-        Failure::Temporary(source) => MtError::Temporary { folder: workspace.folder.clone(), source },
-        Failure::Output(source) => io(source),
+        Failure::Output(source) if !workspace.stop.load(Ordering::Relaxed) => io(source),
+        Failure::Output(source) | Failure::Temporary(source) => workspace.error(source).into(),
     };
     let arranged = arrange(work, options).map_err(name)?;
     // Errors of the closure are those of the operating system alone: ours are kept beside it.

@@ -2,8 +2,7 @@
 
 use std::sync::Arc;
 
-use container::Georeference;
-use container::Sections;
+use container::{Georeference, Sections};
 use vertex_tree::source::PageSource;
 use vertex_tree::{Bounds, NONE, NodeId};
 

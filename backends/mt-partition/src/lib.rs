@@ -53,7 +53,8 @@ mod verify;
 
 pub use build::{LEAST_MEMORY, WriteReport, write, write_within};
 pub use cache::CacheMode;
-pub use collapse_log::external::Workspace;
+pub use collapse_log::external::{Workspace, WorkspaceError};
+pub use container::FileError;
 pub use error::MtError;
 pub use file::{MtFile, StoredNode};
 pub use format::MAGIC;

@@ -21,6 +21,33 @@ impl<'a> Workspace<'a> {
             output.parent().filter(|folder| !folder.as_os_str().is_empty()).unwrap_or(Path::new("."));
         Self { folder: folder.to_owned(), memory: u64::MAX, stop }
     }
+
+    /// What to say where a temporary file has failed: that somebody wanted the work to stop, if so.
+    #[must_use]
+    pub fn error(&self, source: io::Error) -> WorkspaceError {
+        if self.stop.load(Ordering::Relaxed) {
+            WorkspaceError::Interrupted
+        } else {
+            WorkspaceError::Temporary { folder: self.folder.clone(), source }
+        }
+    }
+}
+
+/// Work in a workspace could not be done.
+#[derive(Debug, thiserror::Error)]
+#[non_exhaustive]
+pub enum WorkspaceError {
+    /// A temporary file can not be written or read.
+    #[error("temporary files in {}: {source}", folder.display())]
+    Temporary {
+        /// Where they are made.
+        folder: PathBuf,
+        /// Why.
+        source: io::Error,
+    },
+    /// Somebody wanted it to end.
+    #[error("interrupted")]
+    Interrupted,
 }
 
 /// Fails if somebody wants the work to stop.
