@@ -1,8 +1,5 @@
 //! What of a mesh is in view, and how large.
 
-// The measured figures are off the selection path.
-#![expect(clippy::disallowed_methods, reason = "off the selection path")]
-
 use collapse_log::Mesh;
 use glam::DVec3;
 
