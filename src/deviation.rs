@@ -15,9 +15,6 @@
 //! triangle (forward the nearest, reverse the sampled one) leaves the view, the sample belongs to the *border* and is
 //! counted apart. Nothing is hidden by anything else: occluded surfaces count like visible ones.
 
-// The measured figures are off the selection path.
-#![expect(clippy::disallowed_methods, reason = "off the selection path")]
-
 mod in_view;
 mod sample;
 

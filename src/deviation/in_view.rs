@@ -1,5 +1,8 @@
 //! What of a mesh is in view, and how large.
 
+// The measured figures are off the selection path.
+#![expect(clippy::disallowed_methods, reason = "off the selection path")]
+
 use collapse_log::Mesh;
 use glam::DVec3;
 
@@ -9,6 +12,7 @@ use crate::view::Camera;
 
 /// Points and triangles are worked off in pieces of this many.
 pub(super) const CHUNK: usize = 4096;
+
 /// How much of a displayed triangle is in view.
 #[derive(Clone, Copy, PartialEq, Eq)]
 pub(super) enum Seen {
