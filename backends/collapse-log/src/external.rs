@@ -14,4 +14,4 @@ pub use array::Array;
 pub use paged::Paged;
 pub use scratch::{BackReader, Reader, Scratch, Spool};
 pub use sort::Sorter;
-pub use workspace::{Workspace, WorkspaceError, check_stop};
+pub use workspace::{Workspace, WorkspaceError, check_stop, too_few};

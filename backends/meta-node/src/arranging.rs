@@ -10,7 +10,7 @@ use std::io;
 use std::ops::Range;
 use std::sync::atomic::AtomicBool;
 
-use collapse_log::external::{Scratch, Sorter, Spool, Workspace, check_stop};
+use collapse_log::external::{Scratch, Sorter, Spool, Workspace, check_stop, too_few};
 use collapse_log::{Collapse, LogError, LogSource};
 use vertex_tree::{Bounds, NONE};
 
@@ -317,9 +317,4 @@ impl Storing {
         let count = brought.len() as u32;
         self.nodes.push([first, pivot, end, n, x, y, z, radius, eps, parent, start, count])
     }
-}
-
-/// A temporary file has fewer records than were written.
-fn too_few() -> io::Error {
-    io::ErrorKind::UnexpectedEof.into()
 }

@@ -58,3 +58,9 @@ pub enum WorkspaceError {
 pub fn check_stop(stop: &AtomicBool) -> io::Result<()> {
     if stop.load(Ordering::Relaxed) { Err(io::Error::other("interrupted")) } else { Ok(()) }
 }
+
+/// Says that a temporary file has fewer records than were written.
+#[must_use]
+pub fn too_few() -> io::Error {
+    io::ErrorKind::UnexpectedEof.into()
+}

@@ -7,13 +7,13 @@
 
 use std::io;
 
-use collapse_log::external::{Array, Paged, Sorter, Spool};
+use collapse_log::external::{Array, Paged, Sorter, Spool, too_few};
 use vertex_tree::{Bounds, NONE};
 
 use super::arcs::{ARC_BYTES, NODE_BYTES};
 use super::history::State;
 use super::rounds::Rounds;
-use super::work::{Failure, Work, too_few};
+use super::work::{Failure, Work};
 use crate::bounds::around;
 use crate::graph::Graph;
 use crate::options::BuildOptions;

@@ -16,13 +16,13 @@
 
 use std::io;
 
-use collapse_log::external::{Array, Sorter, Spool};
+use collapse_log::external::{Array, Sorter, Spool, too_few};
 use vertex_tree::NONE;
 
 use super::arcs::{Arcs, Collecting};
 use super::history::{History, State};
 use super::region::{ABOVE, BELOW, Outcome, Region};
-use super::work::{Work, too_few};
+use super::work::Work;
 use crate::reduce::SIZE;
 
 /// Limit of the first round: nodes that hold so many triangles together may be merged.

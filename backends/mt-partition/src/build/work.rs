@@ -43,8 +43,3 @@ impl Work<'_> {
         check_stop(self.stop)
     }
 }
-
-/// A temporary file has fewer records than were written.
-pub(super) fn too_few() -> io::Error {
-    io::ErrorKind::UnexpectedEof.into()
-}

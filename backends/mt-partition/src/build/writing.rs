@@ -6,7 +6,7 @@
 use std::fs::File;
 use std::io::{self, Write};
 
-use collapse_log::external::{Array, Paged, Reader, Sorter, Spool};
+use collapse_log::external::{Array, Paged, Reader, Sorter, Spool, too_few};
 use container::{BY_PAGE, Kind, SectionWriter};
 use vertex_tree::{Bounds, NONE};
 
@@ -14,7 +14,7 @@ use super::arranging::{Arranged, bounds_of};
 use super::history::Fate;
 use super::report::WriteReport;
 use super::versions::follow;
-use super::work::{Failure, Work, too_few};
+use super::work::{Failure, Work};
 use crate::format::{HEADER, Header};
 use crate::options::BuildOptions;
 use crate::partition::QueueOrder;
