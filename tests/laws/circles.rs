@@ -231,7 +231,7 @@ fn leads(imports: &Imports, from: &str, to: &str) -> bool {
                 .into_iter()
                 .flat_map(BTreeMap::keys)
                 .map(String::as_str)
-                .filter(|f| seen.insert(f)),
+                .filter(|&file| seen.insert(file)),
         );
     }
     false
