@@ -7,7 +7,7 @@
 //! |---|---|
 //! | `history` | puts the collapses in order along a curve through space, and finds what becomes of each vertex |
 //! | `versions` | follows each triangle of the input through the collapses that change it; arcs are counted |
-//! | `rounds`, `region` | the reduction, in regions of the curve that fit in memory |
+//! | `rounds`, `region`, `arcs` | the reduction, in regions of the curve that fit in memory |
 //! | `arranging` | nested bounds, layers, partitions and numbers |
 //! | `writing` | follows the triangles once more, sorts them by the arcs that they lie on, and writes |
 //!
