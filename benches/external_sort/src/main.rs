@@ -1,7 +1,7 @@
 //! Sorting of more records than fit in memory: ours beside two crates that are kept for that, extsort and ext-sort.
 //!
 //! ```text
-//! cargo bench -p foldfront-collapse-log --bench external_sort [-- MILLIONS ROUNDS MIB]
+//! cargo run --release --manifest-path benches/external_sort/Cargo.toml [-- MILLIONS ROUNDS MIB]
 //! ```
 //!
 //! The records are those that a construction within a given memory sorts: of 20 bytes (`simplify::out_of_core::prepare`,
@@ -181,8 +181,7 @@ fn median(values: &mut [f64]) -> f64 {
 }
 
 fn main() {
-    // Cargo says `--bench`.
-    let arguments: Vec<String> = std::env::args().skip(1).filter(|argument| argument != "--bench").collect();
+    let arguments: Vec<String> = std::env::args().skip(1).collect();
     if let [sort_, contender, words, count, bytes, folder] = &arguments[..]
         && sort_ == "sort"
     {
