@@ -9,6 +9,12 @@
 //! word anywhere, the others following from it. Each sort is a process of its own, so that its largest memory is its own;
 //! rounds take the contenders in turns. The sums of what comes out have to agree, and its order has to be right.
 //!
+//! With less memory than a MiB, one sort at a time, which prints seconds, bytes beyond those of the start, and the sum:
+//!
+//! ```text
+//! cargo run --release --manifest-path benches/external_sort/Cargo.toml -- sort ours|extsort|ext-sort 4|5|7 COUNT BYTES FOLDER
+//! ```
+//!
 //! Both crates count records, not bytes, and their buffers grow to the next power of two: they are given the largest number for
 //! which that is within the memory. ext-sort writes records by way of serde, unless one writes a chunk oneself as is done
 //! here. Both sort on as many threads as there are processors; ours on two.
