@@ -17,13 +17,14 @@ use std::time::{Duration, Instant};
 use detail_block::{Arrangement, BuildOptions, Io, XfmFile, XfmTree};
 use foldfront::active_mesh::ActiveMesh;
 use foldfront::budget::Budget;
+use foldfront::collapse_log::CollapseLog;
 use foldfront::deviation::Reference;
 use foldfront::engine::{Engine, Settings};
 use foldfront::path::{Path, around, recorded};
 use foldfront::refine::Strategy;
 use foldfront::scene::{Scene, SceneKind};
 use foldfront::vertex_tree::source::FileSource;
-use foldfront::vertex_tree::{CollapseLog, MeshSink, NullSink};
+use foldfront::vertex_tree::{MeshSink, NullSink};
 use foldfront::view::{View, theta_of_pixels};
 use foldfront::{Mesh, mesh_io, simplify};
 

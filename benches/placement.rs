@@ -17,11 +17,11 @@ use std::io::{self, BufWriter, Write};
 use std::path::{Path as FilePath, PathBuf};
 
 use foldfront::compare::{Options, Subject};
+use foldfront::container::Georeference;
 use foldfront::deviation::Reference;
 use foldfront::path::{Path, Pose, around};
 use foldfront::refine::Strategy;
 use foldfront::store::{self, Backend, BuildOptions, Store};
-use foldfront::vertex_tree::Georeference;
 use foldfront::{CollapseLog, Mesh, mesh_io, simplify};
 use glam::DVec3;
 

@@ -15,11 +15,12 @@ use std::sync::Arc;
 use std::time::Duration;
 
 use foldfront::active_mesh::ActiveMesh;
+use foldfront::collapse_log::{read_log, write_log};
 use foldfront::engine::{Engine, FrameReport, Settings};
 use foldfront::path::{self, Path, Pose};
 use foldfront::refine::Strategy;
 use foldfront::scene::{Scene, SceneKind};
-use foldfront::vertex_tree::{MeshSink, NullSink, read_log, write_log};
+use foldfront::vertex_tree::{MeshSink, NullSink};
 use foldfront::view::{View, theta_of_pixels};
 use foldfront::{CollapseLog, Mesh, mesh_io, simplify};
 use glam::{DMat3, DQuat, DVec3};

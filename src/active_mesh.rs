@@ -5,7 +5,8 @@
 //! shows the mesh. Per frame a renderer uploads the entries named by [`ActiveMesh::changed_triangles`] and
 //! [`ActiveMesh::changed_vertices`], then calls [`ActiveMesh::clear_changes`].
 
-use vertex_tree::{Mesh, MeshSink, NONE, TriangleId, VertexId, prefetch};
+use collapse_log::Mesh;
+use vertex_tree::{MeshSink, NONE, TriangleId, VertexId, prefetch};
 
 /// A slot of one of the buffers is named at most once among the changes.
 #[derive(Clone, Debug, Default)]

@@ -4,8 +4,8 @@
 //! Construction of SAH-based Bounding Volume Hierarchies"). Boxes are exact, since coordinates are `f32`; distances
 //! are computed in `f64`. The tree and every answer are the same whatever the number of threads.
 
+use collapse_log::Mesh;
 use glam::DVec3;
-use vertex_tree::Mesh;
 
 use crate::parallel;
 

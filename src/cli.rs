@@ -12,15 +12,16 @@ mod hierarchy;
 mod input;
 mod path;
 mod progress;
+mod say;
 mod values;
 
-use std::io::Write;
 use std::process::ExitCode;
 
 use clap::Parser;
 use clap::error::ErrorKind;
 
 use arguments::{Arguments, Command};
+use say::{Misunderstood, complain};
 
 /// Runs the program with the process's arguments.
 #[must_use]
@@ -64,21 +65,6 @@ pub fn main() -> ExitCode {
     }
 }
 
-/// An argument that is none beside what it is about, such as a tolerance for the lens of a path.
-#[derive(Debug, thiserror::Error)]
-#[error("{0}")]
-struct Misunderstood(String);
-
-/// Says on standard error what went wrong, in one line.
-fn complain(what: &str) {
-    let _ = writeln!(std::io::stderr(), "foldfront: {}", what.replace(['\n', '\r'], " "));
-}
-
-/// Says on standard error, in one line, what the user should know although nothing has failed.
-fn warn(what: &str) {
-    complain(&format!("warning: {what}"));
-}
-
 /// An error and its causes, but for those that it names itself.
 fn failure_line(error: &anyhow::Error) -> String {
     let mut line = error.to_string();
@@ -103,12 +89,4 @@ fn usage_line(error: &clap::Error) -> String {
 
 fn is_broken_pipe(cause: &(dyn std::error::Error + 'static)) -> bool {
     cause.downcast_ref::<std::io::Error>().is_some_and(|e| e.kind() == std::io::ErrorKind::BrokenPipe)
-}
-
-/// Writes to standard output, whose reader may have gone.
-fn print(text: &str) -> anyhow::Result<()> {
-    let mut out = std::io::stdout().lock();
-    out.write_all(text.as_bytes())?;
-    out.flush()?;
-    Ok(())
 }

@@ -22,27 +22,30 @@ mod loading;
 mod opening;
 mod options;
 mod replay;
+mod run;
 mod scene;
 
 use std::ops::{ControlFlow, Range};
 use std::sync::{Arc, mpsc};
 
+use collapse_log::{CollapseLog, Mesh};
 use detail_block::XfmTree;
 use in_memory::{InMemoryHierarchy, InMemoryTree};
 use meta_node::MetaNodeTree;
 use mt_partition::MtTree;
-use vertex_tree::{CollapseLog, Mesh, NullSink, Refine, TreeError};
+use vertex_tree::{NullSink, Refine, TreeError};
 
 pub use self::error::{CompareError, WrongCut};
 pub use self::loading::Loading;
 use self::opening::Opening;
 pub use self::options::{Options, Pace, Paging};
 use self::replay::Replay;
+use self::run::Check;
+pub use self::run::{Row, Run};
 pub use self::scene::replay_scene;
 use crate::active_mesh::ActiveMesh;
 use crate::brute_force::{BruteForce, unfold_all};
-use crate::engine::{Engine, FrameReport, Settings};
-use crate::motion::Speed;
+use crate::engine::{Engine, Settings};
 use crate::oracle::Oracle;
 use crate::parallel;
 use crate::path::Path;
@@ -50,36 +53,6 @@ use crate::progress::Progress;
 use crate::refine::Strategy;
 use crate::store::{Backend, Store, StoreError};
 use crate::view::View;
-
-/// One frame of a replay.
-#[derive(Clone, Copy, Debug)]
-pub struct Row {
-    /// Number of the frame in the path.
-    pub frame: usize,
-    /// What the engine reports.
-    pub report: FrameReport,
-    /// Nodes that differ from the oracle, where that was looked at.
-    pub wrong: Option<u64>,
-}
-
-/// One strategy along one path.
-#[derive(Clone, Debug)]
-pub struct Run {
-    /// What was looked at.
-    pub scene: String,
-    /// Name of the path.
-    pub path: String,
-    /// Where the hierarchy was kept.
-    pub backend: &'static str,
-    /// How the nodes that must change were found.
-    pub strategy: Strategy,
-    /// How pages were loaded.
-    pub prefetch: Loading,
-    /// Declared speed.
-    pub speed: Speed,
-    /// The frames.
-    pub rows: Vec<Row>,
-}
 
 /// A hierarchy with what is needed to replay paths through it.
 pub struct Subject {
@@ -91,12 +64,6 @@ pub struct Subject {
 
 /// Changes that [`Subject::outline`] makes: enough to tell how large a mesh is and whether it is flat.
 pub const OUTLINE: usize = 1 << 18;
-
-/// Brute force, over the collapse log or over a backend's own nodes.
-enum Check {
-    Log(Oracle),
-    Nodes(BruteForce),
-}
 
 /// Calls a generic function with a way to open trees of the subject's backend.
 macro_rules! with_trees {
@@ -311,7 +278,8 @@ impl Subject {
             for &strategy in &options.strategies {
                 let settings = options.settings(strategy, &speed);
                 let frames = frames.clone();
-                let replay = Replay { subject: self, path, frames, views: &views, settings, opening };
+                let replay =
+                    Replay { scene: &self.name, backend, path, frames, views: &views, settings, opening };
                 let rows = with_trees!(self, |open| {
                     let mut rows = replay.measure(open(opening)?, &mut count)?;
                     match check.as_mut() {
@@ -347,8 +315,8 @@ impl Subject {
         count: &mut impl FnMut(),
     ) -> Result<Vec<(usize, Vec<u64>)>, CompareError> {
         let (tick, ticks) = mpsc::channel();
-        let each = |(at, replay): (usize, Replay)| {
-            // Whoever counts is there until all are done.
+        let each = move |(at, replay): (usize, Replay)| {
+            // Whoever counts is there until all are done: that is, until this closure is dropped.
             let mut count = || {
                 let _ = tick.send(());
             };

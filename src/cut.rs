@@ -3,7 +3,8 @@
 //! Nothing here is incremental: every call replays the whole log. It is what the meshes of all backends are compared
 //! with, and how a mesh at one error everywhere is had without a camera.
 
-use vertex_tree::{CollapseLog, Forest, Mesh, NONE};
+use collapse_log::{CollapseLog, Forest, Mesh};
+use vertex_tree::NONE;
 
 /// What a set of active nodes shows, in the numbering of the input mesh.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
@@ -94,7 +95,8 @@ pub fn uniform_cut(log: &CollapseLog, forest: &Forest, eps: f32) -> Vec<bool> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use vertex_tree::{Bounds, Collapse};
+    use collapse_log::Collapse;
+    use vertex_tree::Bounds;
 
     /// A strip of four triangles; the collapses are 1 into 0 (node 0), 5 into 4 (node 1), 0 into 3 (node 2).
     ///

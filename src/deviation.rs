@@ -15,24 +15,20 @@
 //! triangle (forward the nearest, reverse the sampled one) leaves the view, the sample belongs to the *border* and is
 //! counted apart. Nothing is hidden by anything else: occluded surfaces count like visible ones.
 
-// The measured figures are off the selection path.
-#![expect(clippy::disallowed_methods, reason = "off the selection path")]
-
+mod in_view;
 mod sample;
 
 use std::borrow::Cow;
 
+use collapse_log::Mesh;
 use glam::DVec3;
-use vertex_tree::Mesh;
 
 use crate::bvh::Bvh;
-use crate::frustum::{Clipped, Frustum};
 use crate::parallel;
 use crate::view::Camera;
+use in_view::{CHUNK, Seen, View, corners, count_in_view};
 use sample::Sampler;
 
-/// Points and triangles are worked off in pieces of this many.
-const CHUNK: usize = 4096;
 /// The near plane, as a fraction of the original's extent.
 const NEAR: f64 = 1e-6;
 
@@ -226,58 +222,6 @@ impl<'a> Reference<'a> {
     }
 }
 
-/// How much of a displayed triangle is in view.
-#[derive(Clone, Copy, PartialEq, Eq)]
-enum Seen {
-    Everything,
-    Part,
-    Nothing,
-}
-
-/// What the camera sees, and how large.
-struct View {
-    frustum: Frustum,
-    eye: DVec3,
-    /// Pixels that a length equal to its distance from the eye takes in the image.
-    pixels_per_angle: f64,
-    /// Distances from the eye count as at least this much.
-    near: f64,
-}
-
-fn count_in_view(seen: &[Seen]) -> usize {
-    seen.iter().filter(|&&seen| seen != Seen::Nothing).count()
-}
-
-impl View {
-    /// How much of each triangle of a mesh is in view.
-    fn all_seen(&self, mesh: &Mesh) -> Vec<Seen> {
-        parallel::map_chunks(mesh.triangles.len(), CHUNK, |range| {
-            range.map(|t| self.seen(corners(mesh, t))).collect::<Vec<_>>()
-        })
-        .concat()
-    }
-
-    fn new(camera: &Camera, lines: u32, near: f64) -> Self {
-        // A single point as original has no extent; any near plane will do for it.
-        let near = near.max(f64::MIN_POSITIVE);
-        let pixels_per_angle = 0.5 * f64::from(lines) / (0.5 * camera.fov_y()).tan();
-        Self { frustum: Frustum::new(camera, near, 1.0), eye: camera.position(), pixels_per_angle, near }
-    }
-
-    fn seen(&self, corners: [DVec3; 3]) -> Seen {
-        match self.frustum.clip(corners) {
-            Clipped::Inside => Seen::Everything,
-            Clipped::Partly(_) => Seen::Part,
-            Clipped::Outside => Seen::Nothing,
-        }
-    }
-
-    /// Pixels of the length `distance` at the place `at`.
-    fn pixels(&self, distance: f64, at: DVec3) -> f64 {
-        distance * self.pixels_per_angle / at.distance(self.eye).max(self.near)
-    }
-}
-
 /// Measured distances in pixels, and where.
 #[derive(Default)]
 struct Samples {
@@ -312,10 +256,6 @@ impl Facing {
             self.flipped += 1;
         }
     }
-}
-
-fn corners(mesh: &Mesh, triangle: usize) -> [DVec3; 3] {
-    mesh.triangles[triangle].map(|v| DVec3::from(mesh.positions[v as usize].map(f64::from)))
 }
 
 /// Of twice the triangle's area in length.

@@ -9,9 +9,9 @@
 //! backend is wrapped so that changes do ([`Settled`](crate::settled::Settled)).
 
 mod capped;
-mod carried;
 mod changes;
 mod needs;
+mod noted;
 mod waiting;
 mod well_formed;
 
@@ -19,19 +19,19 @@ use std::time::{Duration, Instant};
 
 use vertex_tree::{NodeId, PageStats, Refine, TreeError};
 
-pub(crate) use self::carried::Carried;
-use self::changes::{Counts, Noted, Steps};
-use self::needs::Pending;
-pub(crate) use self::waiting::Waiting;
+use self::changes::{Counts, Steps};
+use self::noted::{Noted, Pending};
 use crate::budget::{Budget, Steering, WorkCap};
+use crate::carried::Carried;
 use crate::criterion::Criterion;
 use crate::foresight::{Foresight, Watched};
-use crate::front::{Front, Slot};
+use crate::front::Front;
+use crate::in_play::{Kind, Slot};
 use crate::motion::{Odometer, Speed};
 use crate::normal_cone::Cones;
-use crate::queue::Kind;
 use crate::refine::{Finder, Flips, Frame, Strategy, Watch, with_strategy};
 use crate::view::{View, check_origin};
+use crate::waiting::Waiting;
 
 /// How an engine refines.
 #[derive(Clone, Copy, Debug, PartialEq)]

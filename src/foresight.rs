@@ -12,46 +12,27 @@
 //! No node is named unless it is wrong in one of the views ahead, and these are within reach at the declared speed, or at
 //! the camera's own where that is faster: nothing that can not be due by then is ever named.
 
+mod ahead;
 mod candidates;
 mod trend;
 
 use rustc_hash::FxHashSet;
 use vertex_tree::{Bounds, Hierarchy, NodeId};
 
+pub(crate) use self::ahead::Watched;
+use self::ahead::{Ahead, Change, MOST_INSTANTS};
 use self::candidates::Candidates;
 use self::trend::Trend;
-use crate::engine::{Carried, Waiting};
-use crate::filter::{Lenses, MOST_VIEWS};
-use crate::front::{Front, Slot};
-use crate::queue::Kind;
-use crate::refine::{Finder, Frame};
+use crate::filter::MOST_VIEWS;
+use crate::front::Front;
+use crate::refine::Frame;
 use crate::view::View;
-
-/// Instants that are looked at: the next frame, then 2, 4, 8 and so on, and the last that is asked for.
-const MOST_INSTANTS: usize = 8;
 
 /// The furthest that is looked ahead, in frames.
 const MOST_FRAMES: u32 = 1 << (MOST_INSTANTS - 2);
 
 /// No more nodes are named in a frame: after a teleport, only the most urgent ones are.
 const MOST_NAMED: usize = 1 << 15;
-
-/// A node that will change, and whose change may lead to others.
-#[derive(Clone, Copy)]
-enum Change {
-    /// A node that is folded now, and perhaps not even in play.
-    Unfold(NodeId),
-    Fold(Slot),
-}
-
-/// What is known at the end of a frame of the nodes that can change next: what a strategy watches, and what waits.
-#[derive(Clone, Copy)]
-pub(crate) struct Watched<'a> {
-    pub front: &'a Front,
-    pub finder: &'a Finder,
-    pub waiting: &'a Waiting,
-    pub carried: &'a Carried,
-}
 
 /// What is kept from frame to frame, above all allocations.
 #[derive(Default)]
@@ -160,28 +141,5 @@ impl Foresight {
             }
         }
         total as u64
-    }
-}
-
-/// The views at the instants ahead.
-struct Ahead<'a> {
-    frame: &'a Frame<'a>,
-    views: &'a [View],
-    instants: usize,
-}
-
-impl Ahead<'_> {
-    fn at(&self, instant: usize) -> &[View] {
-        let count = self.frame.views.len();
-        &self.views[instant * count..][..count]
-    }
-
-    /// Whether a node will have to change at an instant if nothing happens before.
-    fn is_wrong(&self, instant: usize, kind: Kind, slot: Slot, bounds: &Bounds) -> bool {
-        self.frame.unfold_in(self.at(instant), slot, bounds) == (kind == Kind::Unfold)
-    }
-
-    fn lenses(&self, instant: usize) -> Option<Lenses> {
-        Lenses::new(self.frame.criterion, self.at(instant))
     }
 }

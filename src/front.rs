@@ -15,29 +15,7 @@ mod well_formed;
 use slab::Slab;
 use vertex_tree::{Bounds, Hierarchy, NONE, NodeId, prefetch};
 
-use crate::queue::Kind;
-
-/// Where the record of a node in play is. Used again when the node has gone out of play.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
-#[repr(transparent)]
-pub struct Slot(pub u32);
-
-impl Slot {
-    /// Stands for no node.
-    pub const NONE: Self = Self(0);
-
-    /// The slot as an array index.
-    #[inline(always)]
-    #[must_use]
-    pub fn index(self) -> usize {
-        self.0 as usize
-    }
-
-    #[inline(always)]
-    fn pair(self) -> usize {
-        self.0 as usize / 2
-    }
-}
+use crate::in_play::{Kind, Slot};
 
 /// A node's record: half a cache line.
 #[derive(Clone, Copy)]

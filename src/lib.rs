@@ -63,6 +63,7 @@ pub mod active_mesh;
 pub mod brute_force;
 pub mod budget;
 pub mod bvh;
+mod carried;
 #[cfg(feature = "cli")]
 pub mod cli;
 #[cfg(feature = "cli")]
@@ -76,6 +77,7 @@ mod filter;
 mod foresight;
 pub mod front;
 mod frustum;
+pub mod in_play;
 pub mod mesh_io;
 pub mod motion;
 pub mod normal_cone;
@@ -98,7 +100,12 @@ pub mod simplify;
 #[cfg(all(feature = "in-memory", feature = "meta-node", feature = "detail-block", feature = "mt-partition"))]
 pub mod store;
 pub mod view;
+mod waiting;
 
+pub use collapse_log;
+pub use collapse_log::{Collapse, CollapseLog, Mesh};
+pub use container;
+pub use container::output;
 #[cfg(feature = "detail-block")]
 pub use detail_block;
 pub use glam;
@@ -106,6 +113,6 @@ pub use glam;
 pub use in_memory;
 #[cfg(feature = "mt-partition")]
 pub use mt_partition;
+pub use star_mesh;
 pub use vertex_tree;
-pub use vertex_tree::output;
-pub use vertex_tree::{Bounds, Collapse, CollapseLog, Hierarchy, Mesh, NodeId, Refine, VertexTree};
+pub use vertex_tree::{Bounds, Hierarchy, NodeId, Refine, VertexTree};

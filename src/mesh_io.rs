@@ -13,7 +13,7 @@
 //!
 //! Coordinates are read in the precision of the file: that of 64 bits in text but for a `float` of PLY, and of the type in binary. If
 //! 32 bits hold all of them, the mesh has them as they are; otherwise its positions are about its middle, which is the origin
-//! of its [`Georeference`](crate::vertex_tree::Georeference).
+//! of its [`Georeference`](crate::container::Georeference).
 //!
 //! Vertices are neither split nor merged (but for STL, which has none), so that their numbers are those of the file,
 //! and unused ones are kept. Polygons are triangulated, whether convex or not. What has no surface is left out: a
@@ -30,9 +30,11 @@
 
 mod collector;
 mod error;
+mod extension;
 mod geotiff;
 mod hgt;
 mod input;
+mod limits;
 mod obj;
 mod off;
 mod ply;
@@ -48,39 +50,26 @@ mod text;
 mod tiff_map;
 mod tiff_tags;
 mod triangulate;
+mod weld;
 mod words;
 mod write_ply;
 
 pub use collector::Collector;
 pub use error::{MeshIoError, Place};
+pub use extension::EXTENSIONS;
+pub use raster::HeightScale;
 pub use receiver::Receiver;
 pub(crate) use rounding::{Bounds, Placing, exact};
 pub use write_ply::write_ply;
 
 use std::path::Path;
 
-use vertex_tree::DegreeMap;
+use container::DegreeMap;
 
 use crate::Mesh;
 use crate::progress::Progress;
+use extension::extension;
 use input::Input;
-
-/// The extensions that are read, in lower case.
-pub const EXTENSIONS: [&str; 9] = ["obj", "ply", "stl", "off", "hgt", "zip", "png", "tif", "tiff"];
-
-/// Every vertex number, and the number of vertices, is below [`NONE`](crate::vertex_tree::NONE).
-const MAX_VERTICES: usize = crate::vertex_tree::NONE as usize - 1;
-
-/// How the samples of a `.png` or `.tif` height map become positions.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct HeightScale {
-    /// Distance between neighbouring samples, in object space.
-    pub spacing: f64,
-    /// Height of a sample of value 1 above one of value 0, in object space.
-    pub vertical: f64,
-    /// Height of a sample of value 0.
-    pub offset: f64,
-}
 
 /// What may be said about inputs that do not say it themselves.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
@@ -132,12 +121,6 @@ pub fn send(
     progress: Progress<'_>,
 ) -> Result<(), MeshIoError> {
     deliver(inputs, options, Some(folder), receiver, progress)
-}
-
-/// What a file is found to hold.
-struct Contents {
-    /// Whether it has faces, or anything else that joins vertices, be it without surface.
-    faces: bool,
 }
 
 /// Hands a mesh on, with temporary files in `folder`, or everything that is needed in memory if there is none.
@@ -237,9 +220,4 @@ fn check(inputs: &[impl AsRef<Path>]) -> Result<Vec<&Path>, MeshIoError> {
         }
     }
     Ok(inputs)
-}
-
-/// The extension in lower case, empty if there is none.
-fn extension(file: &Path) -> String {
-    file.extension().unwrap_or_default().to_string_lossy().to_ascii_lowercase()
 }

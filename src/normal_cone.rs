@@ -35,7 +35,7 @@ use glam::DVec3;
 use vertex_tree::{Bounds, NormalCone};
 
 use crate::criterion::Criterion;
-use crate::front::Slot;
+use crate::in_play::Slot;
 use crate::motion::Course;
 use crate::view::View;
 

@@ -3,7 +3,8 @@
 //! Every node of the hierarchy is tested, nothing is remembered and no order is relied on. The cut is the closure
 //! upwards of the nodes that some view wants.
 
-use vertex_tree::{Bounds, CollapseLog, Forest, LogError, NONE, NormalCone, Refine};
+use collapse_log::{CollapseLog, Forest, LogError};
+use vertex_tree::{Bounds, NONE, NormalCone, Refine};
 
 use crate::criterion::Criterion;
 use crate::engine::Engine;

@@ -9,42 +9,18 @@
 mod axis;
 mod frame;
 mod lines;
+mod sheet;
 
 use plotters::prelude::*;
 
 use axis::{Axis, moving_median, outline};
 use frame::{Canvas, Drawn, border, frame, palette, picture, pixel};
 pub use lines::{Line, lines};
+use sheet::{FINE, LEFT, RIGHT, SIZE};
+pub use sheet::{Plot, PlotError};
 
-/// Size of the picture in CSS pixels, without the rows of the legend beyond the first.
-const SIZE: (i32, i32) = (960, 440);
-/// Left, right and bottom margins, and the one at the top above the legend.
-const LEFT: i32 = 76;
-const RIGHT: i32 = 24;
-const BOTTOM: i32 = 58;
-const TOP: i32 = 40;
-/// The backend's coordinates are integers; it draws on a canvas that is larger by this factor, for the picture to be
-/// scaled down again by whoever shows it.
-const FINE: i32 = 5;
 /// Points of a curve for each pixel of the plot's width, at most: the highest and the lowest of the frames there.
 const POINTS: usize = 2;
-
-/// What a plot says about itself, and how it is drawn.
-#[derive(Clone, Copy, Debug, Default)]
-pub struct Plot<'a> {
-    /// Heading.
-    pub title: &'a str,
-    /// What is counted to the right.
-    pub x_label: &'a str,
-    /// What is measured upwards, with its unit.
-    pub y_label: &'a str,
-    /// Number of the frame to which the first value of each series belongs.
-    pub first_frame: usize,
-    /// Whether values are drawn by their logarithms. Values that are not positive are then left out.
-    pub logarithmic: bool,
-    /// Frames in the window of a moving median, drawn over the then faint curve itself; below 2, none is drawn.
-    pub median_window: usize,
-}
 
 /// One curve.
 #[derive(Clone, Copy, Debug)]
@@ -55,14 +31,6 @@ pub struct Series<'a> {
     pub values: &'a [f64],
     /// Which of the seven colours it gets, counted modulo their number.
     pub colour: usize,
-}
-
-/// A plot could not be drawn.
-#[derive(Debug, thiserror::Error)]
-#[error("plot {title:?}: {source}")]
-pub struct PlotError {
-    title: String,
-    source: DrawingAreaErrorKind<std::io::Error>,
 }
 
 /// Draws the curves, as the text of an SVG file.

@@ -21,76 +21,18 @@
 //! Events of the tick that a clock is in come up at every advance until that tick has passed: their deadline may
 //! lie anywhere in it.
 
+mod event;
 mod pool;
 mod well_formed;
 mod wheel;
 
 use vertex_tree::{Bounds, prefetch};
 
+pub use self::event::{DUE, Event, HORIZON, TICKS_PER_FRAME};
 use self::pool::{Bucket, CHUNK, Pool};
 use self::wheel::{LEVELS, SLOTS, Wheel};
 
-use crate::front::Slot;
-
-/// Ticks in a frame of a clock. A camera far slower than its course still has ticks that are finer than its frames.
-pub const TICKS_PER_FRAME: f64 = 512.0;
-
-/// The furthest that an event is scheduled ahead, in ticks: 4 million frames.
-pub const HORIZON: u32 = 1 << 31;
-
-/// Which status change an event waits for.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-#[repr(u8)]
-pub enum Kind {
-    /// The node is a boundary node: it may have to unfold.
-    Unfold,
-    /// The node is active and collapsible: it may have to fold.
-    Fold,
-}
-
-/// A test that is due some time. Half a cache line.
-#[derive(Clone, Copy, Debug, PartialEq)]
-#[repr(C, align(32))]
-pub struct Event {
-    /// Sphere and error of the node.
-    pub bounds: Bounds,
-    /// The node to test.
-    pub slot: Slot,
-    /// Twice the ticket, plus 1 where it waits for folding. No member is narrower than its neighbours, or copying an
-    /// event would be several moves.
-    tag: u32,
-    _reserved: u32,
-}
-
-impl Event {
-    /// Stands where there is no event.
-    pub const BLANK: Self = Self {
-        bounds: Bounds { center: [0.0; 3], radius: 0.0, eps: 0.0 },
-        slot: Slot::NONE,
-        tag: 0,
-        _reserved: 0,
-    };
-
-    /// What the test is for.
-    #[inline(always)]
-    #[must_use]
-    pub fn kind(&self) -> Kind {
-        if self.tag & 1 == 0 { Kind::Unfold } else { Kind::Fold }
-    }
-
-    #[inline(always)]
-    pub(crate) fn tag(&self) -> u32 {
-        self.tag
-    }
-
-    #[inline(always)]
-    fn ticket(&self) -> u16 {
-        (self.tag >> 1) as u16
-    }
-}
-
-/// Most events that come up at a time: as many as vector code tests together.
-pub const DUE: usize = crate::packed::LANES;
+use crate::in_play::{Kind, Slot};
 
 /// One clock of a queue.
 pub(crate) struct OnClock<'a> {
@@ -176,8 +118,7 @@ impl EventQueue {
         if self.tickets.len() <= slot.index() {
             self.tickets.resize(slot.index() + 1, 0);
         }
-        let tag = u32::from(self.tickets[slot.index()]) << 1 | u32::from(kind == Kind::Fold);
-        Event { bounds, slot, tag, _reserved: 0 }
+        Event::new(bounds, slot, self.tickets[slot.index()], kind)
     }
 
     /// Whether nothing has cancelled an event since it was made.

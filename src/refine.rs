@@ -2,17 +2,18 @@
 //! [`engine`](crate::engine)), and all must arrive at the same cut.
 
 pub mod event;
+mod frame;
 pub mod front;
 pub mod published;
 pub mod top_down;
+mod watch;
 
 use vertex_tree::Bounds;
 
-use crate::criterion::Criterion;
-use crate::front::{Front, Slot};
-use crate::motion::{Course, Motion, Speed};
-use crate::normal_cone::{self, Cones};
-use crate::queue::Kind;
+pub(crate) use self::frame::{Flips, Frame};
+pub(crate) use self::watch::Watch;
+use crate::front::Front;
+use crate::in_play::{Kind, Slot};
 use crate::view::View;
 
 /// How the nodes that must change are found.
@@ -48,107 +49,6 @@ impl Strategy {
     #[must_use]
     pub fn is_exact(self) -> bool {
         self != Self::EventPublished
-    }
-}
-
-/// What a strategy knows of the frame.
-pub(crate) struct Frame<'a> {
-    pub criterion: Criterion,
-    pub views: &'a [View],
-    pub speed: Speed,
-    pub motion: Motion,
-    /// Of the nodes in play, where the normal-cone test is part of the criterion.
-    pub cones: Option<&'a Cones>,
-}
-
-impl Frame<'_> {
-    /// Whether the node in a slot, which has these bounds, is wanted.
-    #[inline]
-    pub fn unfold(&self, slot: Slot, bounds: &Bounds) -> bool {
-        self.criterion.unfold(self.views, bounds) && self.is_seen(slot, bounds)
-    }
-
-    /// Whether it would be in other views.
-    pub fn unfold_in(&self, views: &[View], slot: Slot, bounds: &Bounds) -> bool {
-        match self.cones {
-            None => self.criterion.unfold(views, bounds),
-            Some(cones) => normal_cone::unfold(self.criterion, views, bounds, &cones.of(slot)),
-        }
-    }
-
-    /// How urgent a change is that is wanted, not negative: of unfolds that of most error first, of folds the least wanted.
-    pub fn urgency(&self, kind: Kind, bounds: &Bounds) -> f64 {
-        let urgency = self.criterion.urgency(self.views, bounds);
-        if kind == Kind::Fold { 1.0 - urgency.min(1.0) } else { urgency }
-    }
-
-    /// [`unfold`](Self::unfold) of two nodes.
-    #[inline(always)]
-    pub fn unfold_both(&self, slots: [Slot; 2], bounds: [&Bounds; 2]) -> [bool; 2] {
-        let wanted = self.criterion.unfold_both(self.views, bounds);
-        match self.cones {
-            None => wanted,
-            Some(_) => [0, 1].map(|i| wanted[i] && self.is_seen(slots[i], bounds[i])),
-        }
-    }
-
-    /// Whether one of the views that want a node does not see it from behind.
-    #[inline]
-    fn is_seen(&self, slot: Slot, bounds: &Bounds) -> bool {
-        self.cones
-            .is_none_or(|cones| normal_cone::unfold(self.criterion, self.views, bounds, &cones.of(slot)))
-    }
-
-    /// How many frames on a course must pass before the node in a slot can have to change.
-    #[inline]
-    pub fn earliest(&self, course: &Course, slot: Slot, kind: Kind, bounds: &Bounds) -> f64 {
-        let (criterion, views) = (self.criterion, self.views);
-        match (self.cones.map(|cones| cones.of(slot)), kind) {
-            (None, Kind::Unfold) => criterion.earliest_unfold(views, course, bounds),
-            (None, Kind::Fold) => criterion.earliest_fold(views, course, bounds),
-            (Some(cone), Kind::Unfold) => {
-                normal_cone::earliest_unfold(criterion, views, course, bounds, &cone)
-            }
-            (Some(cone), Kind::Fold) => normal_cone::earliest_fold(criterion, views, course, bounds, &cone),
-        }
-    }
-}
-
-/// Nodes whose status must flip: boundary nodes to unfold, collapsible nodes to fold.
-#[derive(Default)]
-pub(crate) struct Flips {
-    pub unfold: Vec<Slot>,
-    pub fold: Vec<Slot>,
-    /// Tests of the criterion made to find them.
-    pub tests: u64,
-}
-
-/// A strategy's state, as the part of the engine that carries out changes sees it: that is compiled for each strategy
-/// apart, since several of these calls are made for every change.
-///
-/// The engine tells of every node that becomes or ceases to be a boundary node or collapsible, so that a strategy can
-/// watch just these.
-pub(crate) trait Watch {
-    /// The node has become a boundary node or collapsible; the criterion does not ask for it to change.
-    fn watch(&mut self, frame: &Frame, slot: Slot, kind: Kind, bounds: Bounds);
-
-    /// The node is no longer what it was watched as, if it was watched.
-    fn unwatch(&mut self, slot: Slot);
-
-    /// The same for a node whose status has just changed: what it was watched for has come up.
-    #[inline(always)]
-    fn changed(&mut self, slot: Slot) {
-        self.unwatch(slot);
-    }
-
-    /// The node should have changed, but the backend refused for now: it must be found again in the next frame, even
-    /// if nothing moves.
-    fn refused(&mut self, slot: Slot, kind: Kind, bounds: Bounds);
-
-    /// Starts to read into the cache what [`unwatch`](Self::unwatch) and [`watch`](Self::watch) will touch.
-    #[inline(always)]
-    fn prefetch(&self, slot: Slot) {
-        let _ = slot;
     }
 }
 

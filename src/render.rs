@@ -13,12 +13,14 @@ mod image;
 mod outside;
 mod projection;
 mod raster;
+mod style;
 
 pub use image::{Image, ImageError};
 pub use outside::outside_camera;
+pub use style::{Shading, Style};
 
+use collapse_log::Mesh;
 use glam::DVec3;
-use vertex_tree::Mesh;
 
 use crate::frustum::{Clipped, Frustum};
 use crate::parallel;
@@ -30,9 +32,6 @@ use raster::{Colour, Facet, Line, Scene, Veil};
 const NEAR: f64 = 1e-5;
 /// Triangles are projected in pieces of this many.
 const CHUNK: usize = 4096;
-/// Images are at most this many pixels wide or high.
-const LARGEST: u32 = 8192;
-
 /// The mesh as the camera sees it; in a picture from outside, the part that is in view.
 const IN_VIEW: Colour = Colour::new(0x9d, 0xb7, 0xd8);
 /// The part of the mesh that is out of view.
@@ -51,32 +50,6 @@ const WRAP: f64 = 0.25;
 const LIGHT: DVec3 = DVec3::new(-0.45, 0.6, 1.0);
 /// A back face is darker by this factor.
 const BACK_FACE: f64 = 0.6;
-
-/// How a picture is drawn.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct Style {
-    /// Width in pixels, from 1 to 8192; the height follows from the camera's aspect ratio, within the same limits.
-    pub width: u32,
-    /// How light falls on the triangles.
-    pub shading: Shading,
-    /// Whether the edges of triangles are drawn. They fade where triangles are only a few pixels high.
-    pub wires: bool,
-}
-
-impl Default for Style {
-    fn default() -> Self {
-        Self { width: 1280, shading: Shading::Flat, wires: true }
-    }
-}
-
-/// How light falls on the triangles.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Shading {
-    /// Each by its own normal: shows the triangles.
-    Flat,
-    /// By normals at the vertices, averaged over the triangles around: shows the shape.
-    Smooth,
-}
 
 /// Draws what `camera` sees of `mesh`.
 #[must_use]

@@ -22,8 +22,8 @@ pub(crate) mod noise;
 use std::fmt;
 use std::str::FromStr;
 
+use collapse_log::Mesh;
 use thiserror::Error;
-use vertex_tree::Mesh;
 
 pub use height_field::HeightField;
 

@@ -21,16 +21,19 @@
 mod ball;
 mod candidates;
 mod faces;
+mod initial;
 mod key_counts;
 mod lanes;
 mod legality;
 mod marks;
 mod nodes;
+mod options;
 mod order;
 mod orientation;
 mod out_of_core;
 mod quadric;
 mod remains;
+mod report;
 mod rounds;
 mod samples;
 mod spatial_order;
@@ -40,99 +43,25 @@ mod virtual_edges;
 
 use std::convert::Infallible;
 use std::ops::Range;
-use std::time::{Duration, Instant};
+use std::time::Instant;
 
-use glam::{DVec3, Vec3};
-use vertex_tree::{Collapse, CollapseLog, Georeference, LogError, Mesh};
+use collapse_log::{Collapse, CollapseLog, LogError, Mesh};
+use glam::Vec3;
 
 use crate::parallel;
 use crate::progress::Progress;
+pub use options::Options;
 pub use out_of_core::{LEAST_MEMORY, Limits, MOST_THREADS, OutOfCoreError, build_within};
 pub use remains::Remains;
+pub use report::{Report, Round};
 
 use crate::edge_lengths::{EdgeLengths, power_of_two};
+use initial::{coherent_triangles, initial_quadric, is_flat, leaf_radii};
 use marks::Marks;
-use nodes::{Nodes, round_up};
-use quadric::Quadric;
-use rounds::Builder;
+use nodes::Nodes;
+use rounds::{AT_ONCE, Builder};
 use stall::Stall;
-use surface::{Neighbour, Surface};
-
-/// How to simplify.
-#[derive(Clone, Debug, Default, PartialEq)]
-#[non_exhaustive]
-pub struct Options {
-    /// Also merge vertices of different components that are near each other, so that many separate objects end in
-    /// few roots.
-    pub merge_components: bool,
-}
-
-/// A round of independent collapses, which is a pass where the mesh is larger than memory.
-#[derive(Clone, Debug, Default, PartialEq)]
-#[non_exhaustive]
-pub struct Round {
-    /// The largest key that was taken up.
-    pub limit: f32,
-    /// Collapses made, and the keys of the first and of the last of them.
-    pub collapses: usize,
-    /// See [`collapses`](Self::collapses).
-    pub keys: [f32; 2],
-}
-
-impl Round {
-    /// Puts a collapse behind the others.
-    fn push(&mut self, key: f32) {
-        if self.collapses == 0 {
-            self.keys[0] = key;
-        }
-        self.keys[1] = key;
-        self.collapses += 1;
-    }
-}
-
-/// What a simplification did.
-#[derive(Clone, Debug, Default, PartialEq)]
-#[non_exhaustive]
-pub struct Report {
-    /// Triangles of the input.
-    pub triangles: usize,
-    /// Collapses made.
-    pub collapses: usize,
-    /// Rounds of independent collapses, in order.
-    pub rounds: Vec<Round>,
-    /// Collapses that depend on another of their round: those at vertices with very many triangles, of which a round may take
-    /// away more than one.
-    pub followers: usize,
-    /// Rounds in all, with those in which candidates were found illegal or dearer than they seemed, and none was collapsed.
-    pub attempted_rounds: usize,
-    /// Roots of the forest.
-    pub roots: usize,
-    /// Depth of the forest.
-    pub tree_depth: u32,
-    /// Length of the longest chain of nodes each of which must be folded before the next.
-    pub dependency_depth: u32,
-    /// Triangles of the base mesh.
-    pub base_triangles: usize,
-    /// Why these are not simplified further.
-    pub remains: Remains,
-    /// The largest error of a node, in object units.
-    pub largest_eps: f32,
-    /// Collapses whose key was less than that of an earlier one.
-    pub inversions: usize,
-    /// Parts of the mesh that have been loaded, one after the other, and the vertices in them; 0 if the mesh was in memory
-    /// from the beginning.
-    pub windows: u64,
-    /// See [`windows`](Self::windows).
-    pub loaded: u64,
-    /// Where the mesh lies in the world.
-    pub georeference: Georeference,
-    /// Time to prepare: renumbering, quadrics.
-    pub preparation: Duration,
-    /// Time of the rounds.
-    pub simplification: Duration,
-    /// Time to make the log and to check it.
-    pub conclusion: Duration,
-}
+use surface::Surface;
 
 /// Simplifies a mesh until no legal collapse is left.
 ///
@@ -247,101 +176,4 @@ fn sequence(keys: &[f32], rounds: &[(Range<u32>, f32)]) -> (Vec<u32>, Vec<Round>
         done.push(round);
     }
     (sequence, done, inversions)
-}
-
-/// Vertices that a thread prepares at once.
-const AT_ONCE: usize = 1 << 15;
-
-/// Weight of a plane that holds a boundary edge in place, per squared length of the edge.
-const BOUNDARY_WEIGHT: f64 = 4.0;
-
-/// A weight in single precision. The sums of a few thousand such weights, times a length, are finite still.
-fn bounded_weight(weight: f64) -> f32 {
-    weight.min(1e30) as f32
-}
-
-/// For each vertex in the new numbering, its distance to the farthest corner of its triangles, in object units.
-fn leaf_radii(mesh: &Mesh, number: &[u32]) -> Vec<f32> {
-    let mut farthest = vec![0.0_f64; number.len()];
-    let position = |v: u32| DVec3::from(mesh.positions[v as usize].map(f64::from));
-    for &[a, b, c] in mesh.triangles.iter().filter(|t| !is_flat(**t)) {
-        for (v, w) in [(a, b), (b, c), (c, a)] {
-            let squared = position(v).distance_squared(position(w));
-            for v in [v, w] {
-                let farthest = &mut farthest[number[v as usize] as usize];
-                *farthest = squared.max(*farthest);
-            }
-        }
-    }
-    farthest.into_iter().map(leaf_radius).collect()
-}
-
-/// The radius of a leaf's sphere from the squared distance to the farthest corner of its triangles.
-fn leaf_radius(squared: f64) -> f32 {
-    round_up(squared.sqrt() * (1.0 + 1e-15))
-}
-
-/// Whether a triangle names a vertex twice, and so shows nothing.
-fn is_flat([a, b, c]: [u32; 3]) -> bool {
-    a == b || b == c || c == a
-}
-
-/// The triangles with three different corners in the new numbering, in the order of their lowest vertices.
-fn coherent_triangles(triangles: &[[u32; 3]], number: &[u32]) -> Vec<[u32; 3]> {
-    let renumbered = || triangles.iter().map(|t| t.map(|v| number[v as usize])).filter(|t| !is_flat(*t));
-    let lowest = |[a, b, c]: [u32; 3]| a.min(b).min(c) as usize;
-    let mut place = vec![0_usize; number.len() + 1];
-    for t in renumbered() {
-        place[lowest(t) + 1] += 1;
-    }
-    for v in 1..place.len() {
-        place[v] += place[v - 1];
-    }
-    let mut ordered = vec![[0; 3]; place.last().copied().unwrap_or(0)];
-    for t in renumbered() {
-        let slot = &mut place[lowest(t)];
-        ordered[*slot] = t;
-        *slot += 1;
-    }
-    ordered
-}
-
-/// The planes of the triangles around `v`, weighted by area, and at edges that do not join exactly two triangles a plane
-/// through the edge, upright on the triangle. Also whether the vertex has [such edges](Surface::special).
-fn initial_quadric(
-    v: u32,
-    surface: &Surface,
-    marks: &mut Marks,
-    neighbours: &mut Vec<Neighbour>,
-) -> (Quadric, bool) {
-    let unit = surface.unit;
-    let (mut quadric, mut special) = (Quadric::default(), false);
-    // In double precision no product of four lengths vanishes or overflows.
-    let area = 0.5 / (unit * unit);
-    for spoke in surface.spokes(v) {
-        let [a, b, c] = surface.triangles[spoke.triangle as usize].corners;
-        let normal = surface.normal(a, b, c);
-        let length = normal.length();
-        if length > 0.0 {
-            let weight = bounded_weight(area * length);
-            quadric.add_plane((normal / length).as_vec3(), weight, weight);
-        }
-    }
-    if !surface.is_surrounded(v) {
-        surface.neighbours(v, marks, neighbours);
-        special = neighbours.iter().any(|n| !n.is_regular());
-        marks.clear();
-        for n in neighbours.iter().filter(|n| n.triangles != 2) {
-            marks.set(n.vertex, 0);
-        }
-        for s in surface.spokes(v) {
-            for w in [s.next, s.last].into_iter().filter(|&w| marks.get(w).is_some()) {
-                let edge = surface.position(w).as_dvec3() - surface.position(v).as_dvec3();
-                let weight = BOUNDARY_WEIGHT * edge.length_squared() / (unit * unit);
-                let upright = edge.cross(surface.normal(v, s.next, s.last)).normalize_or_zero();
-                quadric.add_plane(upright.as_vec3(), bounded_weight(weight), 0.0);
-            }
-        }
-    }
-    (quadric, special)
 }

@@ -4,15 +4,15 @@ use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use std::sync::atomic::AtomicBool;
 
+use collapse_log::{
+    CollapseLog, LogError, LogFile, LogFileError, LogSource, read_log, write_log, write_log_from,
+};
+use container::Georeference;
 use detail_block::{XfmError, XfmFile};
 use in_memory::InMemoryHierarchy;
 use meta_node::{Dependencies, MetaNodeError, MetaNodeFile};
 use mt_partition::{MtError, MtFile};
 use vertex_tree::source::{FileSource, PageSource};
-use vertex_tree::{
-    CollapseLog, Georeference, LogError, LogFile, LogFileError, LogSource, read_log, write_log,
-    write_log_from,
-};
 
 /// Where a hierarchy is kept.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]

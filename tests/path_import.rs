@@ -5,9 +5,9 @@
 
 use std::path::{Path as FilePath, PathBuf};
 
+use foldfront::container::{DegreeMap, Georeference};
 use foldfront::path::import::{ImportError, Mode, Options, Warning, import, import_text, import_warning};
 use foldfront::path::{Path, PathError, Pose, around};
-use foldfront::vertex_tree::{DegreeMap, Georeference};
 use foldfront::{Mesh, mesh_io};
 use glam::{DQuat, DVec3};
 use proptest::prelude::*;

@@ -8,9 +8,9 @@ use std::f64::consts::PI;
 
 use foldfront::Bounds;
 use foldfront::criterion::Criterion;
-use foldfront::front::Slot;
+use foldfront::in_play::{Kind, Slot};
 use foldfront::motion::{Course, Motion, Odometer};
-use foldfront::queue::{DUE, Event, EventQueue, HORIZON, Kind, TICKS_PER_FRAME};
+use foldfront::queue::{DUE, Event, EventQueue, HORIZON, TICKS_PER_FRAME};
 use foldfront::view::{Camera, View};
 use glam::DVec3;
 use proptest::prelude::*;

@@ -3,10 +3,10 @@
 use std::path::PathBuf;
 use std::sync::Arc;
 
+use foldfront::collapse_log::{read_log, write_log};
 use foldfront::path::Path;
 use foldfront::path::import::{Mode, Options, import};
 use foldfront::vertex_tree::source::FileSource;
-use foldfront::vertex_tree::{read_log, write_log};
 use foldfront::view::{View, theta_of_pixels};
 use foldfront::{CollapseLog, mesh_io, simplify};
 use meta_node::{BuildOptions, MetaNodeFile};

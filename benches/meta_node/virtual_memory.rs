@@ -14,11 +14,11 @@ use std::io::Write;
 use std::path::Path;
 
 use bytemuck::{Pod, Zeroable};
+use foldfront::collapse_log::CollapseLog;
+use foldfront::container::output;
+use foldfront::star_mesh::{LeafTriangle, StarMesh};
 use foldfront::vertex_tree::source::MappedSource;
-use foldfront::vertex_tree::{
-    Bounds, CollapseLog, Hierarchy, LeafTriangle, MeshSink, NONE, NodeId, PageStats, StarMesh, Step,
-    TreeError, VertexTree, output,
-};
+use foldfront::vertex_tree::{Bounds, Hierarchy, MeshSink, NONE, NodeId, PageStats, Step, TreeError, VertexTree};
 
 #[derive(Clone, Copy, Pod, Zeroable)]
 #[repr(C)]

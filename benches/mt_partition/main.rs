@@ -26,11 +26,12 @@ use std::path::PathBuf;
 use std::sync::Arc;
 use std::time::Instant;
 
+use foldfront::collapse_log::{read_log, write_log};
 use foldfront::engine::{Engine, FrameReport, Settings};
 use foldfront::path::{Path, Pose};
 use foldfront::refine::Strategy;
 use foldfront::vertex_tree::source::FileSource;
-use foldfront::vertex_tree::{MeshSink, NullSink, VertexTree, read_log, write_log};
+use foldfront::vertex_tree::{MeshSink, NullSink, VertexTree};
 use foldfront::view::{Camera, View, theta_of_pixels};
 use foldfront::{CollapseLog, Mesh, mesh_io, simplify};
 use glam::DVec3;

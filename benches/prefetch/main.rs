@@ -12,6 +12,7 @@ mod slow_store;
 use std::path::{Path as FilePath, PathBuf};
 use std::time::Duration;
 
+use foldfront::collapse_log::read_log;
 use foldfront::compare::csv::Summary;
 use foldfront::compare::{Loading, Options, Pace, Paging, Run, Subject};
 use foldfront::mesh_io;
@@ -20,7 +21,6 @@ use foldfront::path::{Path, Pose};
 use foldfront::refine::Strategy;
 use foldfront::simplify;
 use foldfront::store::{self, Backend, BuildOptions, Store};
-use foldfront::vertex_tree::read_log;
 use foldfront::vertex_tree::simulated::Simulated;
 
 const DATA: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/../shared/data");

@@ -10,7 +10,7 @@ use meta_node::Dependencies;
 use mt_partition::CacheMode;
 use vertex_tree::simulated::Simulated;
 
-use super::Misunderstood;
+use super::say::Misunderstood;
 use super::values::{backend, cache, duration, frames, positive, prefetch, size, strategy, work_cap};
 use crate::budget::WorkCap;
 use crate::compare::{Loading, Pace};

@@ -4,13 +4,13 @@ use std::ops::Range;
 use std::path::Path as FilePath;
 
 use anyhow::{Context, Result, bail};
-use vertex_tree::Mesh;
+use collapse_log::Mesh;
 
 use super::arguments::Compare;
 use super::destination::check_folder;
 use super::input::{Input, Replayable};
 use super::progress::stage;
-use super::{Misunderstood, print};
+use super::say::{Misunderstood, print};
 use crate::budget::Budget;
 use crate::compare::{Options, Paging, Run, Subject, csv, replay_scene};
 use crate::objects::StoredScene;

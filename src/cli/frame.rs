@@ -3,13 +3,13 @@
 use std::fmt::Write;
 
 use anyhow::{Context, Result, bail};
-use vertex_tree::Mesh;
+use collapse_log::Mesh;
 
 use super::arguments::{Deviation, Export, LINES, Refinement, Render};
 use super::destination::{Content, check_file};
 use super::input::{Input, Replayable};
-use super::print;
 use super::progress::stage;
+use super::say::print;
 use crate::compare::Options;
 use crate::deviation::Reference;
 use crate::path::Path;

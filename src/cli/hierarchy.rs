@@ -5,14 +5,15 @@ use std::path::{Path, PathBuf};
 use std::sync::atomic::{AtomicBool, Ordering};
 
 use anyhow::{Context, Result};
+use collapse_log::{CollapseLog, LogFile, Mesh, log_file_version, read_log};
+use container::{DegreeMap, Georeference};
 use serde_json::json;
-use vertex_tree::{CollapseLog, DegreeMap, Georeference, LogFile, Mesh, log_file_version, read_log};
 
 use super::arguments::{Build, Info, Verify};
 use super::destination::{Content, check_file};
 use super::input::Input;
-use super::print;
 use super::progress::stage;
+use super::say::{print, warn};
 use crate::mesh_io::{self, ReadOptions, Receiver};
 use crate::progress::Progress;
 use crate::simplify;
@@ -122,7 +123,7 @@ const HUNDREDTH: usize = 100;
 fn warn_of_rounding(georeference: &Georeference) {
     let rounding = georeference.rounding;
     if let Some(share) = rounding.share().filter(|share| share * HUNDREDTH as f64 > 1.0) {
-        super::warn(&format!(
+        warn(&format!(
             "32 bits about the middle do not hold the coordinates: they move by up to {}, which is {share:.2} of the median edge",
             rounding.largest_move
         ));

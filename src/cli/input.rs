@@ -6,7 +6,7 @@ use std::sync::Arc;
 use std::time::{Duration, Instant};
 
 use anyhow::{Context, Result, bail};
-use vertex_tree::{CollapseLog, Mesh};
+use collapse_log::{CollapseLog, Mesh};
 
 use super::progress::stage;
 use crate::compare::Subject;
@@ -124,7 +124,7 @@ impl Input {
         let name = self.name();
         match self {
             Self::Scene(scene) => stage(&format!("{name}: making the scene"), |p| Ok(scene.mesh(p))),
-            Self::Log(path) => Ok(vertex_tree::read_log(path)?.mesh),
+            Self::Log(path) => Ok(collapse_log::read_log(path)?.mesh),
             Self::Stored(path) => {
                 let subject = Subject::of_store(&name, Store::open(path)?);
                 Ok(stage(&format!("{name}: reading"), |_| subject.finest())?)
@@ -139,7 +139,7 @@ impl Input {
     /// The hierarchy: read, or built. `None` as the report says that it was read.
     pub fn log(&self, merge_components: bool) -> Result<(CollapseLog, Option<simplify::Report>)> {
         match self {
-            Self::Log(path) => return Ok((vertex_tree::read_log(path)?, None)),
+            Self::Log(path) => return Ok((collapse_log::read_log(path)?, None)),
             Self::Stored(path) => {
                 bail!("{}: this is a hierarchy already; a mesh or a collapse log is expected", path.display())
             }

@@ -7,8 +7,8 @@ use anyhow::{Context, Result};
 use super::arguments::{PathCommand, PathSubcommand};
 use super::destination::{Content, check_file};
 use super::input::Input;
-use super::print;
 use super::progress::stage;
+use super::say::{print, warn};
 use crate::path::{self, Path, import};
 use crate::scene::{Scene, SceneKind};
 
@@ -38,7 +38,7 @@ pub(super) fn path(command: &PathCommand) -> Result<()> {
             let path = import::import_warning(trajectory, &mesh, &options, &mut |w| warnings.push(w))?;
             path.write(output)?;
             for warning in warnings {
-                super::warn(&warning.to_string());
+                warn(&warning.to_string());
             }
             let mut text = String::new();
             describe(&mut text, &path);

@@ -5,7 +5,7 @@ use std::time::Duration;
 
 use vertex_tree::PageStats;
 
-use super::Run;
+use super::run::Run;
 use crate::engine::Limit;
 
 /// Columns of `frames.csv`: one row per scene, path, backend, strategy and frame. What is added comes last.

@@ -1,8 +1,9 @@
 //! Why a comparison stops.
 
-use vertex_tree::{LogError, TreeError};
+use collapse_log::LogError;
+use vertex_tree::TreeError;
 
-use super::Loading;
+use super::loading::Loading;
 use crate::criterion::Criterion;
 use crate::objects::StoredSceneError;
 use crate::oracle::Difference;

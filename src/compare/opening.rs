@@ -5,7 +5,8 @@ use mt_partition::Memory;
 use vertex_tree::Hierarchy;
 use vertex_tree::simulated::Simulated;
 
-use super::{Loading, Pace, Paging};
+use super::loading::Loading;
+use super::options::{Pace, Paging};
 use crate::objects::ScenePaging;
 use crate::settled::Settled;
 

@@ -6,7 +6,8 @@ use meta_node::Dependencies;
 use mt_partition::CacheMode;
 use vertex_tree::simulated::Simulated;
 
-use super::{CompareError, Loading};
+use super::error::CompareError;
+use super::loading::Loading;
 use crate::budget::{Budget, WorkCap};
 use crate::criterion::Criterion;
 use crate::engine::Settings;

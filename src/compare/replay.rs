@@ -3,18 +3,23 @@
 use std::ops::Range;
 use std::time::{Duration, Instant};
 
-use vertex_tree::{Hierarchy, NodeId, NullSink, Refine, VertexTree};
+use vertex_tree::{Hierarchy, NodeId, NullSink, Refine, TreeError, VertexTree};
 
-use super::{Check, CompareError, Opening, Pace, Row, Subject, WrongCut};
+use super::error::{CompareError, WrongCut};
+use super::opening::Opening;
+use super::options::Pace;
+use super::run::{Check, Row};
 use crate::active_mesh::ActiveMesh;
 use crate::engine::{Engine, FrameReport, Settings};
 use crate::path::Path;
 use crate::refine::Strategy;
 use crate::settled::Settled;
+use crate::store::Backend;
 use crate::view::View;
 
 pub(super) struct Replay<'a> {
-    pub subject: &'a Subject,
+    pub scene: &'a str,
+    pub backend: Backend,
     pub path: &'a Path,
     pub frames: Range<usize>,
     pub views: &'a [View],
@@ -26,6 +31,10 @@ pub(super) struct Replay<'a> {
 const FIRST_ROUNDS: usize = 200;
 
 impl Replay<'_> {
+    fn tree_error(&self, source: TreeError) -> CompareError {
+        CompareError::Tree { scene: self.scene.to_owned(), source }
+    }
+
     /// Replays the path, and calls `after` with each frame, its view and its report.
     fn run<T: Refine<S>, S>(
         &self,
@@ -33,7 +42,7 @@ impl Replay<'_> {
         sink: S,
         mut after: impl FnMut(usize, &mut Engine<Settled<T>, S>, FrameReport) -> Result<(), CompareError>,
     ) -> Result<(), CompareError> {
-        let wrap = |e| self.subject.tree_error(e);
+        let wrap = |e| self.tree_error(e);
         let mut engine = Engine::new(tree, sink, self.settings).map_err(wrap)?;
         let mut start = Instant::now();
         // While a frame waits for the store the path does not go on.
@@ -67,7 +76,7 @@ impl Replay<'_> {
         engine: &mut Engine<Settled<T>, S>,
         views: &[View],
     ) -> Result<FrameReport, CompareError> {
-        let wrap = |e| self.subject.tree_error(e);
+        let wrap = |e| self.tree_error(e);
         let mut all = engine.advance(views).map_err(wrap)?;
         for _ in 0..FIRST_ROUNDS {
             if all.misses == 0 {
@@ -108,7 +117,7 @@ impl Replay<'_> {
             // What is carried over or blocked is not wrong, it is late, and what was refused keeps back just what depends
             // on it.
             let is_exact = self.settings.strategy.is_exact() && report.carried + report.blocked == 0;
-            let (scene, path) = (self.subject.name.clone(), self.path.name.clone());
+            let (scene, path) = (self.scene.to_owned(), self.path.name.clone());
             let wrong = match check {
                 Check::Log(oracle) => {
                     let difference = oracle.compare(engine);
@@ -126,7 +135,7 @@ impl Replay<'_> {
                     difference.map_or(0, |d| d.count as u64)
                 }
                 Check::Nodes(brute_force) => {
-                    let backend = self.subject.backend();
+                    let backend = self.backend;
                     let has_dependencies = backend.has_dependencies(self.opening.paging.dependencies);
                     let [wrong, unexplained] = brute_force.judge(engine, has_dependencies);
                     if unexplained > 0 && is_exact {
@@ -152,7 +161,7 @@ impl Replay<'_> {
         beside: Settled<T>,
         count: &mut impl FnMut(),
     ) -> Result<Vec<u64>, CompareError> {
-        let wrap = |e| self.subject.tree_error(e);
+        let wrap = |e| self.tree_error(e);
         let mut differs = vec![0_u64; tree.node_limit().div_ceil(64) as usize];
         let settings = Settings { strategy: Strategy::Front, ..self.settings };
         let mut exact = Engine::new(beside, NullSink, settings).map_err(wrap)?;

@@ -5,7 +5,10 @@
 
 use std::ops::Range;
 
-use super::{CompareError, Opening, Options, Pace, Row, Run};
+use super::error::CompareError;
+use super::opening::Opening;
+use super::options::{Options, Pace};
+use super::run::{Row, Run};
 use crate::objects::StoredScene;
 use crate::path::Path;
 use crate::progress::Progress;

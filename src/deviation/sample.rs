@@ -2,10 +2,10 @@
 
 use std::collections::VecDeque;
 
+use collapse_log::Mesh;
 use glam::DVec3;
-use vertex_tree::Mesh;
 
-use super::{Seen, View, corners};
+use super::in_view::{CHUNK, Seen, View, corners};
 use crate::frustum::Clipped;
 use crate::parallel;
 
@@ -51,7 +51,7 @@ impl<'a> Sampler<'a> {
     }
 
     fn count(&self) -> usize {
-        let counts = parallel::map_chunks(self.seen.len(), super::CHUNK, |range| {
+        let counts = parallel::map_chunks(self.seen.len(), CHUNK, |range| {
             let mut count = 0;
             for triangle in range {
                 self.for_each_further(triangle, |_| count += 1);

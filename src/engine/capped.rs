@@ -27,12 +27,12 @@ use std::time::{Duration, Instant};
 
 use vertex_tree::{Refine, TreeError};
 
-use super::carried::{A_FRAME, HEAPS, Urgent};
-use super::changes::{Noted, Steps, is_boundary, is_collapsible};
+use super::changes::Steps;
+use super::noted::{Noted, is_boundary, is_collapsible};
 use crate::budget::{FOLDS_OF, WorkCap};
-use crate::front::Slot;
+use crate::carried::{A_FRAME, HEAPS, Urgent};
+use crate::in_play::{Kind, Slot};
 use crate::motion::Motion;
-use crate::queue::Kind;
 use crate::refine::Watch;
 
 /// Changes that are new and are put where they wait together, without a look at the time.

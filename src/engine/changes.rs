@@ -7,17 +7,13 @@ use std::time::Instant;
 
 use vertex_tree::{NodeId, Refine, Step, TreeError};
 
-use super::carried::Carried;
-use super::needs::Pending;
-use super::waiting::Waiting;
+use super::noted::{Noted, Pending, is_boundary, is_collapsible, note};
 use crate::budget::WorkCap;
-use crate::front::{Front, Record, Slot};
-use crate::queue::Kind;
+use crate::carried::Carried;
+use crate::front::{Front, Record};
+use crate::in_play::{Kind, Slot};
 use crate::refine::{Flips, Frame, Watch};
-
-/// A node in play and the slot that it was in when this was noted. By the time its turn comes it may have gone out of
-/// play and another node may have come to the slot.
-pub(super) type Noted = (Slot, NodeId);
+use crate::waiting::Waiting;
 
 /// Counts of the frame under way.
 #[derive(Default)]
@@ -374,27 +370,4 @@ impl<T: Refine<S>, S, F: Watch> Steps<'_, T, S, F> {
             self.ready.iter().for_each(|&child| test(child));
         }
     }
-}
-
-/// Looks up the nodes in some slots, before anything changes.
-fn note(front: &Front, slots: &[Slot], noted: &mut Vec<Noted>) {
-    noted.clear();
-    for slots in slots.chunks(32) {
-        slots.iter().for_each(|&slot| front.prefetch(slot));
-        noted.extend(slots.iter().map(|&slot| (slot, front.node(slot))));
-    }
-}
-
-/// Whether a node that was noted is still in its slot and collapsible.
-#[inline(always)]
-pub(super) fn is_collapsible(front: &Front, (slot, node): Noted) -> bool {
-    let record = front.record(slot);
-    record.node == node && record.is_collapsible()
-}
-
-/// Whether a node that was noted is still in its slot and a boundary node.
-#[inline(always)]
-pub(super) fn is_boundary(front: &Front, (slot, node): Noted) -> bool {
-    let record = front.record(slot);
-    record.node == node && record.is_boundary()
 }

@@ -5,31 +5,10 @@
 
 use vertex_tree::{NodeId, Refine, Step, TreeError};
 
-use super::changes::{Noted, Steps, is_boundary};
-use crate::front::Slot;
-use crate::queue::Kind;
+use super::changes::Steps;
+use super::noted::{Noted, Pending, is_boundary};
+use crate::in_play::{Kind, Slot};
 use crate::refine::Watch;
-
-/// A node waiting on the stack for its turn.
-#[derive(Clone, Copy, PartialEq)]
-pub(super) struct Pending {
-    /// Where the node is, if it is known to be in play.
-    pub slot: Slot,
-    pub node: NodeId,
-    /// Whether an entry below waits for this one: a dependency, not something that a view wants.
-    needed: bool,
-    /// Whether this entry waits for those above.
-    waits: bool,
-}
-
-impl Pending {
-    pub fn wanted((slot, node): Noted) -> Self {
-        Self { slot, node, needed: false, waits: false }
-    }
-    fn needed(node: NodeId) -> Self {
-        Self { slot: Slot::NONE, node, needed: true, waits: false }
-    }
-}
 
 impl<T: Refine<S>, S, F: Watch> Steps<'_, T, S, F> {
     /// Unfolds what waits on the stack, from the top.

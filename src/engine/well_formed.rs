@@ -3,8 +3,7 @@
 use vertex_tree::{Bounds, Hierarchy};
 
 use super::Engine;
-use crate::front::Slot;
-use crate::queue::Kind;
+use crate::in_play::{Kind, Slot};
 use crate::refine::Finder;
 
 impl<T: Hierarchy, S> Engine<T, S> {

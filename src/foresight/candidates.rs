@@ -8,12 +8,11 @@ use glam::DVec3;
 use multiversion::multiversion;
 use vertex_tree::Bounds;
 
-use super::{Ahead, Change, MOST_INSTANTS, Watched};
+use super::ahead::{Ahead, Change, MOST_INSTANTS, Watched};
 use crate::filter::{Lens, Lenses, Rates, certainly, doubtful, earliest, for_each_bit};
-use crate::front::Slot;
+use crate::in_play::{Kind, Slot};
 use crate::motion::{Course, Travel};
 use crate::packed::{Block, LANES};
-use crate::queue::Kind;
 use crate::refine::Finder;
 
 #[derive(Default)]

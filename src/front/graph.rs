@@ -6,7 +6,8 @@
 
 use vertex_tree::{Hierarchy, NodeId};
 
-use super::{ACTIVE, Front, MANY, Record, Slot, mix};
+use super::{ACTIVE, Front, MANY, Record, mix};
+use crate::in_play::Slot;
 
 impl Front {
     /// Records that a boundary node has been unfolded. Calls `hold` with those of its parents that were collapsible, and

@@ -2,7 +2,8 @@
 
 use vertex_tree::{Hierarchy, NONE, NodeId};
 
-use super::{ACTIVE, COUNT, Front, MANY, Record, Slot, mix};
+use super::{ACTIVE, COUNT, Front, MANY, Record, mix};
+use crate::in_play::Slot;
 
 impl Front {
     /// Checks that every pair of records is linked once or free, that each node in play has the record that the backend's

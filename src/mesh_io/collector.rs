@@ -2,9 +2,9 @@
 
 use std::io;
 
-use vertex_tree::{DegreeMap, Georeference, Rounding};
+use container::{DegreeMap, Georeference, Rounding};
 
-use super::Receiver;
+use super::receiver::Receiver;
 use super::rounding::{Bounds, Placing, exact};
 use crate::Mesh;
 use crate::edge_lengths::EdgeLengths;
@@ -22,7 +22,7 @@ pub struct Collector {
 impl Collector {
     /// The mesh. Its origin is 0 and its positions are what has been taken, bit for bit, if 32 bits hold all of them.
     /// Otherwise they are about the middle of the bounding box, and no coordinate has moved by more than 2^-25 of the extent
-    /// along its axis: see [`Georeference::rounding`](crate::vertex_tree::Georeference::rounding).
+    /// along its axis: see [`Georeference::rounding`](crate::container::Georeference::rounding).
     #[must_use]
     pub fn into_mesh(self) -> Mesh {
         let Self { mut mesh, wide: Some(wide) } = self else { return self.mesh };

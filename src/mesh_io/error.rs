@@ -3,6 +3,9 @@
 use std::fmt;
 use std::path::PathBuf;
 
+use super::extension::EXTENSIONS;
+use super::limits::{MAX_CORNERS, MAX_SPAN};
+
 /// Where in a file. Lines are counted from 1, everything else from 0.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[non_exhaustive]
@@ -58,7 +61,7 @@ pub enum MeshIoError {
         source: std::io::Error,
     },
     /// The format is told by the extension, and this one is none of them.
-    #[error("{}: unknown extension {extension:?}: expected {}", file.display(), super::EXTENSIONS.join(", "))]
+    #[error("{}: unknown extension {extension:?}: expected {}", file.display(), EXTENSIONS.join(", "))]
     UnknownExtension {
         /// The file.
         file: PathBuf,
@@ -156,7 +159,7 @@ pub enum MeshIoError {
         vertices: usize,
     },
     /// A face has more corners than anyone should triangulate.
-    #[error("{}: {place}: {corners} corners, at most {} are read", file.display(), super::polygon::MAX_CORNERS)]
+    #[error("{}: {place}: {corners} corners, at most {} are read", file.display(), MAX_CORNERS)]
     TooManyCorners {
         /// The file.
         file: PathBuf,
@@ -224,7 +227,7 @@ pub enum MeshIoError {
         other: PathBuf,
     },
     /// The tiles of a mosaic lie too far apart for a flat map.
-    #[error("{}: more than {} degrees from {}", file.display(), super::hgt::MAX_SPAN, other.display())]
+    #[error("{}: more than {} degrees from {}", file.display(), MAX_SPAN, other.display())]
     TilesTooFarApart {
         /// A tile.
         file: PathBuf,

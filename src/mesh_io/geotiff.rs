@@ -1,6 +1,6 @@
 //! Where the samples of a GeoTIFF are: OGC 19-008r4, "OGC GeoTIFF standard", 2019, and GDAL's own tags.
 
-use vertex_tree::DegreeMap;
+use container::DegreeMap;
 
 use super::hgt::METRES_PER_DEGREE;
 use super::raster::Location;

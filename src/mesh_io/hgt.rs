@@ -17,17 +17,19 @@ use std::io::{BufReader, Read, Seek, SeekFrom, Write};
 use std::ops::Range;
 use std::path::{Path, PathBuf};
 
-use vertex_tree::DegreeMap;
+use container::DegreeMap;
 use zip::ZipArchive;
 use zip::result::ZipError;
 
-use super::input::Input;
+use super::error::{MeshIoError, Place};
+use super::extension::extension;
+use super::input::{self, Input};
+use super::limits::MAX_SPAN;
+use super::raster::centred;
+use super::receiver::{Contents, Receiver};
 use super::terrain::{self, HeightGrid};
-use super::{Contents, MeshIoError, Place, Receiver};
 use crate::progress::Progress;
 
-/// Greatest width and height of a mosaic, in degrees.
-pub(super) const MAX_SPAN: i32 = 20;
 /// Metres on the ground in a degree of latitude, from the mean radius of the Earth (IUGG).
 pub(super) const METRES_PER_DEGREE: f64 = 6_371_008.8 * std::f64::consts::PI / 180.0;
 const VOID: i16 = i16::MIN;
@@ -50,7 +52,7 @@ struct Found {
 fn find(inputs: &[&Path], progress: Progress<'_>) -> Result<Vec<Found>, MeshIoError> {
     let mut found = Vec::new();
     for &input in inputs {
-        if super::extension(input) == "zip" {
+        if extension(input) == "zip" {
             find_in_archive(input, &mut found)?;
         } else {
             let bytes = Input::open(input, &mut *progress)?.length;
@@ -133,7 +135,7 @@ fn find_in_archive(path: &Path, found: &mut Vec<Found>) -> Result<(), MeshIoErro
         let name = entry.name().map_err(|e| archive_error(path, e))?;
         let name = name.rsplit('/').next().unwrap_or("");
         // Archives made on a Mac have a hidden companion `._NAME` for each file.
-        if super::extension(Path::new(name)) == "hgt" && !name.starts_with('.') {
+        if extension(Path::new(name)) == "hgt" && !name.starts_with('.') {
             let mut tile = Found::new(path.join(name), entry.size())?;
             tile.archived = Some((path.to_owned(), number));
             found.push(tile);
@@ -143,7 +145,7 @@ fn find_in_archive(path: &Path, found: &mut Vec<Found>) -> Result<(), MeshIoErro
 }
 
 fn open_archive(path: &Path) -> Result<ZipArchive<BufReader<File>>, MeshIoError> {
-    let file = super::input::open_file(path)?;
+    let file = input::open_file(path)?;
     ZipArchive::new(BufReader::new(file)).map_err(|e| archive_error(path, e))
 }
 
@@ -156,7 +158,7 @@ fn read_samples(reader: &mut dyn Read, tile: &Found) -> Result<Vec<i16>, MeshIoE
     let mut bytes = Vec::with_capacity(expected + 1);
     // Reading past the end is what makes an archive compare its checksum.
     let outcome = reader.take(expected as u64 + 1).read_to_end(&mut bytes);
-    outcome.map_err(|e| super::input::read_error(&tile.path, Place::Byte(bytes.len() as u64), e))?;
+    outcome.map_err(|e| input::read_error(&tile.path, Place::Byte(bytes.len() as u64), e))?;
     if bytes.len() != expected {
         return Err(MeshIoError::TileSize { file: tile.path.clone(), bytes: bytes.len() as u64 });
     }
@@ -232,7 +234,7 @@ enum Samples {
 
 impl Samples {
     fn open(tile: &Found) -> Result<Self, MeshIoError> {
-        let file = super::input::open_file(&tile.path)?;
+        let file = input::open_file(&tile.path)?;
         Ok(Self::File { path: tile.path.clone(), file })
     }
 
@@ -255,7 +257,7 @@ impl Samples {
                 let start = 2 * (row * side) as u64;
                 let mut file = file;
                 let outcome = file.seek(SeekFrom::Start(start)).and_then(|_| file.read_exact(&mut bytes));
-                outcome.map_err(|e| super::input::read_error(path, Place::Byte(start), e))?;
+                outcome.map_err(|e| input::read_error(path, Place::Byte(start), e))?;
                 let samples = bytes.chunks_exact(2).map(|b| i16::from_be_bytes([b[0], b[1]]));
                 samples.enumerate().for_each(|(i, s)| take(i, s));
             }
@@ -356,14 +358,14 @@ impl HeightGrid for Mosaic {
     }
 
     fn position(&self, row: usize, column: usize, height: f32) -> [f32; 3] {
-        let [x, y] = super::raster::centred(self, row, column, self.spacing);
+        let [x, y] = centred(self, row, column, self.spacing);
         [x, y, height]
     }
 }
 
 #[cfg(test)]
 mod tests {
-    use super::super::Collector;
+    use super::super::collector::Collector;
     use super::*;
 
     #[test]

@@ -5,7 +5,7 @@ use std::fs::{self, File};
 use std::io::{self, BufRead, BufReader, Read, Seek, SeekFrom};
 use std::path::Path;
 
-use super::{MeshIoError, Place};
+use super::error::{MeshIoError, Place};
 use crate::progress::Progress;
 
 /// Progress is reported each time so many bytes have been read.

@@ -5,10 +5,12 @@
 
 use std::path::Path;
 
+use super::error::{MeshIoError, Place};
 use super::input::Input;
+use super::limits::MAX_VERTICES;
 use super::polygon::FaceSender;
+use super::receiver::{Contents, Receiver};
 use super::text::{Line, Lines};
-use super::{Contents, MAX_VERTICES, MeshIoError, Place, Receiver};
 use crate::progress::Progress;
 
 const KEYWORDS: [&str; 4] = ["OFF", "COFF", "NOFF", "CNOFF"];

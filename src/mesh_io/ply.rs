@@ -16,10 +16,12 @@ use std::path::Path;
 
 use serde_ply::{ElementDef, PropertyType, ScalarType};
 
+use super::error::{MeshIoError, Place};
 use super::input::Input;
-use super::polygon::{FaceSender, MAX_CORNERS};
+use super::limits::{MAX_CORNERS, MAX_VERTICES};
+use super::polygon::FaceSender;
+use super::receiver::{Contents, Receiver};
 use super::text::check_coordinate;
-use super::{Contents, MAX_VERTICES, MeshIoError, Place, Receiver};
 use crate::progress::Progress;
 use body::{Body, is_float};
 

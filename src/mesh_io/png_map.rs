@@ -2,9 +2,9 @@
 
 use png::{BitDepth, ColorType, DecodingError, OutputInfo, Transformations};
 
+use super::error::{MeshIoError, Place};
 use super::input::Input;
-use super::raster::{Location, MAX_COMPRESSION, Raster};
-use super::{HeightScale, MeshIoError, Place};
+use super::raster::{HeightScale, Location, MAX_COMPRESSION, Raster};
 
 /// Reads a PNG of grey samples; smaller ones than 8 bits are scaled up to these.
 pub(super) fn read(mut input: Input<'_>, scale: Option<HeightScale>) -> Result<Raster, MeshIoError> {

@@ -2,11 +2,10 @@
 
 use std::path::Path;
 
+use super::error::{MeshIoError, Place};
+use super::limits::MAX_CORNERS;
+use super::receiver::Receiver;
 use super::triangulate::Triangulator;
-use super::{MeshIoError, Place, Receiver};
-
-/// Ear clipping is quadratic at worst.
-pub(super) const MAX_CORNERS: usize = 1 << 14;
 
 /// The faces of a file, collected before they are triangulated: a face may come before its vertices.
 pub(super) struct Faces {

@@ -3,11 +3,23 @@
 use std::ops::Range;
 use std::path::Path;
 
-use vertex_tree::DegreeMap;
+use container::DegreeMap;
 
+use super::error::MeshIoError;
+use super::receiver::{Contents, Receiver};
 use super::terrain::{self, HeightGrid};
-use super::{Contents, HeightScale, MeshIoError, Receiver};
 use crate::progress::Progress;
+
+/// How the samples of a `.png` or `.tif` height map become positions.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct HeightScale {
+    /// Distance between neighbouring samples, in object space.
+    pub spacing: f64,
+    /// Height of a sample of value 1 above one of value 0, in object space.
+    pub vertical: f64,
+    /// Height of a sample of value 0.
+    pub offset: f64,
+}
 
 /// No compression that is read packs more than this many bytes into one: deflate reaches 1032, LZW about 1400.
 pub(super) const MAX_COMPRESSION: u64 = 1500;

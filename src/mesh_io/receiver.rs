@@ -2,7 +2,7 @@
 
 use std::io;
 
-use vertex_tree::DegreeMap;
+use container::DegreeMap;
 
 /// Takes the vertices and triangles of a mesh in order. A triangle names vertices that have been taken before it.
 pub trait Receiver {
@@ -27,4 +27,10 @@ pub trait Receiver {
     /// Takes what the file says of where the mesh lies: the name of the coordinate system, empty where it gives none, and
     /// how degrees have been laid on a plane. At most once, at any time.
     fn georeference(&mut self, coordinate_system: &str, degrees: Option<DegreeMap>);
+}
+
+/// What a file is found to hold.
+pub(super) struct Contents {
+    /// Whether it has faces, or anything else that joins vertices, be it without surface.
+    pub faces: bool,
 }

@@ -7,15 +7,15 @@
 //! The count of a binary file is not always right: who writes piece by piece leaves a 0. The length of the file tells, too. In
 //! text, white space separates words, be it lines or not.
 
-use std::collections::HashMap;
-use std::hash::Hash;
 use std::io::{self, BufRead, Read};
 use std::path::Path;
 
+use super::error::{MeshIoError, Place};
 use super::input::{BYTE_ORDER_MARK, Input, read_error};
+use super::receiver::{Contents, Receiver};
 use super::stl_text::read_text;
 use super::text::check_coordinate;
-use super::{Contents, MAX_VERTICES, MeshIoError, Place, Receiver};
+use super::weld::Weld;
 use crate::progress::Progress;
 
 const HEADER_BYTES: usize = 84;
@@ -119,40 +119,4 @@ fn facets_with_attributes(input: &mut Input<'_>) -> io::Result<Option<u64>> {
 fn skip(input: &mut Input<'_>, bytes: u16) -> io::Result<()> {
     let skipped = io::copy(&mut input.take(u64::from(bytes)), &mut io::sink())?;
     if skipped < u64::from(bytes) { Err(io::ErrorKind::UnexpectedEof.into()) } else { Ok(()) }
-}
-
-/// Facets joined where their corners agree.
-pub(super) struct Weld<'a, K> {
-    receiver: &'a mut dyn Receiver,
-    /// The bits of a position: fewer where all coordinates have 32.
-    key: fn([f64; 3]) -> K,
-    /// The vertex at each position.
-    vertices: HashMap<K, u32>,
-}
-
-impl<'a, K: Hash + Eq> Weld<'a, K> {
-    fn new(receiver: &'a mut dyn Receiver, key: fn([f64; 3]) -> K) -> Self {
-        Self { receiver, key, vertices: HashMap::new() }
-    }
-
-    pub fn push(&mut self, facet: [[f64; 3]; 3], file: &Path) -> Result<(), MeshIoError> {
-        let mut triangle = [0; 3];
-        for (corner, position) in triangle.iter_mut().zip(facet) {
-            // Adding 0 makes 0 of -0 and leaves everything else alone.
-            let position = position.map(|x| x + 0.0);
-            let next = self.vertices.len() as u32;
-            *corner = *self.vertices.entry((self.key)(position)).or_insert(next);
-            if *corner == next {
-                if next as usize >= MAX_VERTICES {
-                    return Err(MeshIoError::TooManyVertices { file: file.to_owned() });
-                }
-                self.receiver.position(position).map_err(MeshIoError::Receiver)?;
-            }
-        }
-        let [a, b, c] = triangle;
-        if a == b || b == c || c == a {
-            return Ok(());
-        }
-        self.receiver.triangle(triangle).map_err(MeshIoError::Receiver)
-    }
 }

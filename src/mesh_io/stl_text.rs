@@ -16,10 +16,10 @@
 
 use std::hash::Hash;
 
+use super::error::{MeshIoError, Place};
 use super::input::Input;
-use super::stl::Weld;
+use super::weld::Weld;
 use super::words::Words;
-use super::{MeshIoError, Place};
 
 pub(super) fn read_text<K: Hash + Eq>(
     mut input: Input<'_>,

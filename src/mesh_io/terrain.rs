@@ -8,7 +8,9 @@
 use std::ops::Range;
 use std::path::Path;
 
-use super::{MAX_VERTICES, MeshIoError, Place, Receiver};
+use super::error::{MeshIoError, Place};
+use super::limits::MAX_VERTICES;
+use super::receiver::Receiver;
 use crate::progress::Progress;
 
 /// Rows of samples from north to south, and columns from west to east.
@@ -114,7 +116,7 @@ fn split_cell(north: &[f32], south: &[f32], column: usize, triangles: &mut Vec<[
 
 #[cfg(test)]
 mod tests {
-    use super::super::Collector;
+    use super::super::collector::Collector;
     use super::*;
     use crate::Mesh;
 

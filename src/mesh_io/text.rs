@@ -4,8 +4,8 @@ use std::io::{self, BufRead};
 use std::path::Path;
 use std::str::FromStr;
 
+use super::error::{MeshIoError, Place};
 use super::input::{BYTE_ORDER_MARK, Input};
-use super::{MeshIoError, Place};
 
 /// Lends the lines of a file that hold anything, one after the other.
 pub(super) struct Lines<'i, 'a> {

@@ -9,11 +9,11 @@ use tiff::decoder::{Decoder, DecodingResult, Limits};
 use tiff::tags::Tag;
 use tiff::{ColorType, TiffError, TiffResult};
 
+use super::error::{MeshIoError, Place};
 use super::geotiff::{self, GeoTags};
 use super::input::Input;
-use super::raster::{MAX_COMPRESSION, Raster};
+use super::raster::{HeightScale, MAX_COMPRESSION, Raster};
 use super::tiff_tags::Blackened;
-use super::{HeightScale, MeshIoError, Place};
 
 /// Marks a void in signed 16-bit heights, tagged as such or not.
 const VOID: f64 = -32768.0;

@@ -2,9 +2,9 @@
 
 use std::io::{self, BufRead};
 
+use super::error::{MeshIoError, Place};
 use super::input::Input;
 use super::text::{left_over, malformed, parse_coordinate};
-use super::{MeshIoError, Place};
 
 /// Lends the words of a file one after the other.
 pub(super) struct Words<'i, 'a> {

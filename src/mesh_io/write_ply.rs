@@ -4,7 +4,7 @@ use std::fs::File;
 use std::io::{self, BufWriter, Write};
 use std::path::Path;
 
-use super::MeshIoError;
+use super::error::MeshIoError;
 use crate::{Mesh, output};
 
 /// Writes a mesh as binary PLY, with a colour (red, green, blue) for each vertex if there are any: to a temporary

@@ -4,8 +4,8 @@ use std::time::Duration;
 
 use vertex_tree::{NullSink, Refine, TreeError};
 
-use super::stored::{ObjectLine, StoredSceneError};
-use super::{Object, ObjectsError, together};
+use super::object::{Object, ObjectsError, together};
+use super::stored_error::{ObjectLine, StoredSceneError};
 use crate::brute_force::BruteForce;
 use crate::engine::FrameReport;
 use crate::view::View;

@@ -13,7 +13,7 @@
 use std::io;
 use std::path::{Path, PathBuf};
 
-use super::{Placement, PlacementError};
+use super::placement::{Placement, PlacementError};
 
 /// A scene file can not be read.
 #[derive(Debug, thiserror::Error)]

@@ -19,95 +19,20 @@ use in_memory::InMemoryTree;
 use meta_node::MetaNodeTree;
 use mt_partition::{Memory, MtTree, Reader};
 use rustc_hash::FxHashMap;
-use vertex_tree::{LogError, NullSink, Refine, TreeError};
+use vertex_tree::{NullSink, Refine};
 
 use super::any::{AnyObject, StoredObjects};
+use super::object::Object;
+use super::placement::Placement;
 use super::scene_file::read_lines;
-use super::{Object, Placement, SceneFileError};
+use super::stored_error::{ObjectLine, StoredSceneError};
 use crate::brute_force::BruteForce;
 use crate::engine::{FrameReport, Settings};
-use crate::mesh_io::{self, MeshIoError};
+use crate::mesh_io;
 use crate::settled::Settled;
 use crate::simplify;
 use crate::store::{Backend, Store, StoreError};
-use crate::view::{View, ViewError};
-
-/// A scene can not be opened or replayed.
-#[derive(Debug, thiserror::Error)]
-#[non_exhaustive]
-pub enum StoredSceneError {
-    /// The scene file.
-    #[error(transparent)]
-    Scene(#[from] SceneFileError),
-    /// A file that it names can not be opened, or is damaged.
-    #[error("{at}: {}", at.named(source))]
-    File {
-        /// Which object's.
-        at: Box<ObjectLine>,
-        /// Why.
-        source: StoreError,
-    },
-    /// A file that it names is no hierarchy, and no mesh either.
-    #[error("{at}: {}", at.named(source))]
-    Mesh {
-        /// Which object's.
-        at: Box<ObjectLine>,
-        /// Why.
-        source: MeshIoError,
-    },
-    /// A mesh that it names can not be simplified.
-    #[error("{at}: {}", at.named(source))]
-    Build {
-        /// Which object's.
-        at: Box<ObjectLine>,
-        /// Why.
-        source: LogError,
-    },
-    /// A thread that reads can not be had.
-    #[error("the thread that reads: {0}")]
-    Thread(std::io::Error),
-    /// An object can not go on.
-    #[error("{at}: {}", at.named(source))]
-    Tree {
-        /// Which object.
-        at: Box<ObjectLine>,
-        /// Why.
-        source: TreeError,
-    },
-    /// A view of the scene is none of an object.
-    #[error("{at}: {}", at.named(source))]
-    View {
-        /// Which object.
-        at: Box<ObjectLine>,
-        /// What is wrong with the view.
-        source: ViewError,
-    },
-}
-
-/// Where an object comes from.
-#[derive(Clone, Debug, PartialEq, Eq)]
-pub struct ObjectLine {
-    /// The scene file.
-    pub scene: PathBuf,
-    /// The line there, counted from 1.
-    pub line: usize,
-    /// The file that it names.
-    pub file: PathBuf,
-}
-
-impl ObjectLine {
-    /// What is wrong, with the file in front, unless it says so itself.
-    fn named(&self, what: &impl ToString) -> String {
-        let (file, what) = (self.file.display().to_string(), what.to_string());
-        if what.contains(&file) { what } else { format!("{file}: {what}") }
-    }
-}
-
-impl std::fmt::Display for ObjectLine {
-    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
-        write!(f, "{}: line {}", self.scene.display(), self.line)
-    }
-}
+use crate::view::View;
 
 /// An object of a scene.
 #[derive(Clone, Debug)]

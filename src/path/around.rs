@@ -1,9 +1,9 @@
 //! A walkthrough for anything: once around, from afar to near.
 
+use collapse_log::Mesh;
 use glam::DVec3;
-use vertex_tree::Mesh;
 
-use super::{Path, Pose};
+use super::walkthrough::{Path, Pose};
 use crate::view::{Camera, ViewError, check_eye};
 
 const FRAMES: usize = 720;
@@ -46,7 +46,7 @@ pub fn around(mesh: &Mesh) -> Result<Path, ViewError> {
 
 #[cfg(test)]
 mod tests {
-    use vertex_tree::Georeference;
+    use container::Georeference;
 
     use super::*;
 

@@ -4,7 +4,7 @@
 
 use glam::{DMat3, DQuat, DVec3};
 
-use super::{Path, Pose};
+use super::walkthrough::{Path, Pose};
 
 pub(super) const FRAMES_PER_SECOND: f64 = 60.0;
 

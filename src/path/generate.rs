@@ -9,7 +9,8 @@ use std::f64::consts::PI;
 use glam::{DVec2, DVec3};
 
 use super::director::{Director, Waypoint, catmull_rom};
-use super::{Path, PathError};
+use super::error::PathError;
+use super::walkthrough::Path;
 use crate::progress::Progress;
 use crate::scene::{HeightField, Scene, SceneKind, city, laserscan};
 

@@ -43,68 +43,22 @@ mod header;
 mod hoppe;
 mod kept;
 mod names;
+mod options;
 mod placement;
+mod reading;
 mod resample;
 mod table;
 mod trajectory;
 
 use std::path::Path as FilePath;
 
-use vertex_tree::Mesh;
+use collapse_log::Mesh;
 
 pub use error::{ImportError, Warning};
+pub use options::{MAX_FRAMES, MAX_RATE, Mode, Options, Up};
 
-use super::{Path, PathError, text};
+use super::{Path, text};
 use trajectory::Place;
-
-/// How a trajectory is placed.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Mode {
-    /// Over the mesh and clear of it: over terrain at the trajectory's own height above the highest ground around;
-    /// over an object across a dome that encloses its bounding sphere.
-    Fly,
-    /// At eye height, a thousandth of the mesh's diagonal, above the highest surface.
-    Walk,
-    /// Around the mesh: the longer side of the trajectory's box becomes the azimuth once around, its height the
-    /// elevation and its shorter side the distance. The camera looks at the middle of the mesh, but for the recorded
-    /// rotation's quick part, below about a second and at most 8 degrees.
-    Orbit,
-}
-
-/// Which axis of the mesh points up.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Up {
-    /// As in scanned objects.
-    Y,
-    /// As in terrain and cities.
-    Z,
-}
-
-/// How to import.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Options {
-    /// How the trajectory is placed.
-    pub mode: Mode,
-    /// Frames a second, above 0 and at most [`MAX_RATE`].
-    pub rate: f64,
-    /// Which axis of the mesh points up; `None` guesses z for a mesh that is flat in z, else y.
-    pub up: Option<Up>,
-    /// Whether the trajectory is scaled and moved to the mesh, after the mode. Otherwise it keeps its place, scale and
-    /// time: metres are the mesh's world coordinates as they are, whatever axis is up, and degrees go through the map of
-    /// the mesh's georeference. Only the camera's axes become those of a path.
-    pub fit: bool,
-}
-
-impl Default for Options {
-    fn default() -> Self {
-        Self { mode: Mode::Fly, rate: 60.0, up: None, fit: true }
-    }
-}
-
-/// The largest [`Options::rate`].
-pub const MAX_RATE: f64 = 1000.0;
-/// The most frames that an imported path can have: about two days at 60 a second.
-pub const MAX_FRAMES: usize = 10_000_000;
 
 /// Reads a trajectory and brings it to a mesh. The path is named after the file; its positions are world coordinates.
 ///
@@ -146,7 +100,7 @@ fn of_text(
         return Err(ImportError::Mesh { extent });
     }
     let place = if fit { Place::Fitted } else { Place::Kept(mesh.georeference.degrees) };
-    let recorded = trajectory::read(file, text, place, warn)?;
+    let recorded = reading::read(file, text, place, warn)?;
     if recorded.samples.len() < 2 {
         return Err(ImportError::TooShort { file: file.to_owned(), frames: recorded.samples.len() });
     }

@@ -2,7 +2,7 @@
 
 use glam::DVec3;
 
-use super::Path;
+use super::walkthrough::Path;
 
 /// The motion from one frame to the next.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
@@ -66,7 +66,7 @@ impl Path {
         let teleport =
             moving.get(moving.len() / 2).map_or(f64::INFINITY, |median| median * Summary::TELEPORT);
         let at_rest = |step: &Motion| step.rho == 0.0 && step.omega == 0.0;
-        let time = |frame: Option<&super::Pose>| frame.map_or(0.0, |frame| frame.time);
+        let time = |frame: Option<&super::walkthrough::Pose>| frame.map_or(0.0, |frame| frame.time);
         Summary {
             frames: self.frames.len(),
             seconds: time(self.frames.last()) - time(self.frames.first()),
@@ -107,7 +107,7 @@ fn angle(u: DVec3, v: DVec3) -> f64 {
 mod tests {
     use glam::DQuat;
 
-    use super::super::Pose;
+    use super::super::walkthrough::Pose;
     use super::*;
 
     /// A path along x by the given steps, each also a turn about y by the given angles.

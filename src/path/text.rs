@@ -3,7 +3,7 @@
 use std::io;
 use std::path::Path as FilePath;
 
-use super::PathError;
+use super::error::PathError;
 
 /// The text of a file. What is not UTF-8 is taken for Latin-1: all that matters to us is ASCII, and comments come in any
 /// encoding that has it.

@@ -6,7 +6,7 @@ use plotters::prelude::*;
 use plotters::style::text_anchor::{HPos, Pos, VPos};
 
 use super::axis::Axis;
-use super::{BOTTOM, FINE, LEFT, Plot, PlotError, RIGHT, SIZE, TOP};
+use super::sheet::{BOTTOM, FINE, LEFT, Plot, PlotError, RIGHT, SIZE, TOP};
 
 /// Height of a row of the legend.
 const LEGEND_ROW: i32 = 22;

@@ -4,7 +4,7 @@ use plotters::prelude::*;
 
 use super::axis::Axis;
 use super::frame::{border, frame, palette, picture};
-use super::{FINE, Plot, PlotError};
+use super::sheet::{FINE, Plot, PlotError};
 
 /// One line through points.
 #[derive(Clone, Debug)]

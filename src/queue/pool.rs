@@ -2,7 +2,7 @@
 
 use vertex_tree::prefetch;
 
-use super::{DUE, Event};
+use super::event::{DUE, Event};
 
 /// Events in a chunk.
 pub(super) const CHUNK: u32 = 16;

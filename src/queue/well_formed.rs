@@ -1,8 +1,9 @@
 //! Whether a queue is what it should be.
 
+use super::EventQueue;
+use super::event::Event;
 use super::pool::{Bucket, CHUNK};
 use super::wheel::Wheel;
-use super::{Event, EventQueue};
 
 impl EventQueue {
     /// Calls `f` with every event that has not been cancelled.

@@ -1,7 +1,7 @@
 //! Buckets by deadline, on one clock.
 
+use super::event::{Event, HORIZON, TICKS_PER_FRAME};
 use super::pool::{Bucket, Pool};
-use super::{Event, HORIZON, TICKS_PER_FRAME};
 
 /// Slots a level. Deadlines go to the level on which they are at least half of this away.
 pub(super) const SLOTS: u64 = 16;

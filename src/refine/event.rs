@@ -16,12 +16,13 @@ use glam::DVec3;
 use multiversion::multiversion;
 use vertex_tree::Bounds;
 
-use super::{Flips, Frame, Watch};
+use super::frame::{Flips, Frame};
+use super::watch::Watch;
 use crate::filter::{Lens, Lenses, Rates, earliest};
-use crate::front::Slot;
+use crate::in_play::{Kind, Slot};
 use crate::motion::{Course, Motion, Odometer, Speed, Travel};
 use crate::packed::{Block, LANES};
-use crate::queue::{Event, EventQueue, HORIZON, Kind, OnClock, TICKS_PER_FRAME};
+use crate::queue::{Event, EventQueue, HORIZON, OnClock, TICKS_PER_FRAME};
 use crate::view::View;
 
 /// Clocks that run at the same time. When a new course needs one, the oldest gives up its events: they are tested early.

@@ -6,11 +6,11 @@
 use multiversion::multiversion;
 use vertex_tree::Bounds;
 
-use super::{Flips, Frame, Watch};
+use super::frame::{Flips, Frame};
+use super::watch::Watch;
 use crate::filter::{Lens, Lenses, certainly, doubtful, for_each_bit};
-use crate::front::Slot;
+use crate::in_play::{Kind, Slot};
 use crate::packed::Packed;
-use crate::queue::Kind;
 
 #[derive(Default)]
 pub(crate) struct FrontScan {

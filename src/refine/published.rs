@@ -24,9 +24,10 @@
 use glam::DVec3;
 use vertex_tree::Bounds;
 
-use super::{Flips, Frame, Watch};
-use crate::front::{Front, Slot};
-use crate::queue::Kind;
+use super::frame::{Flips, Frame};
+use super::watch::Watch;
+use crate::front::Front;
+use crate::in_play::{Kind, Slot};
 use crate::view::View;
 
 /// Frames that the circular buffer spans. Later events wait in its last list, and are inserted again from there.

@@ -3,9 +3,10 @@
 //! The paper's recursion, with a stack. Records lie in the order in which the front descended, which is that of this
 //! walk where nothing has changed since: memory is read in sequence.
 
-use super::{Flips, Frame, Watch};
-use crate::front::{Front, Slot};
-use crate::queue::Kind;
+use super::frame::{Flips, Frame};
+use super::watch::Watch;
+use crate::front::Front;
+use crate::in_play::{Kind, Slot};
 use vertex_tree::{Bounds, NONE};
 
 #[derive(Default)]

@@ -2,7 +2,7 @@
 
 use glam::DVec3;
 
-use super::{LARGEST, Style};
+use super::style::{LARGEST, Style};
 use crate::frustum::{Clipped, Frustum};
 use crate::view::Camera;
 

@@ -1,6 +1,6 @@
 //! Fills triangles and draws lines, in horizontal bands that are independent of each other.
 
-use super::Image;
+use super::image::Image;
 use super::projection::{Corner, Projection, SAMPLES};
 use crate::parallel;
 

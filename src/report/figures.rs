@@ -1,6 +1,6 @@
 //! The curves of a report.
 
-use super::Section;
+use super::section::Section;
 use crate::compare::csv::Summary;
 use crate::compare::{Row, Run};
 use crate::engine::FrameReport;

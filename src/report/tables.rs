@@ -3,7 +3,7 @@
 use std::fmt::Write;
 use std::time::Duration;
 
-use super::{Section, escape};
+use super::section::Section;
 use crate::compare::Run;
 use crate::compare::csv::Summary;
 use crate::refine::Strategy;
@@ -203,4 +203,9 @@ pub(super) fn microseconds(time: Duration) -> String {
 fn mebibytes(bytes: u64) -> String {
     let value = bytes as f64 / f64::from(1 << 20);
     if value < 100.0 { format!("{value:.2}") } else { format!("{value:.0}") }
+}
+
+/// Text as it stands in a page.
+pub(super) fn escape(text: &str) -> String {
+    text.replace('&', "&amp;").replace('<', "&lt;").replace('>', "&gt;").replace('"', "&quot;")
 }

@@ -1,7 +1,7 @@
 //! A building as a closed solid: walls cut in bays and storeys, a floor and a roof.
 
+use collapse_log::Mesh;
 use glam::{DVec2, DVec3};
-use vertex_tree::Mesh;
 
 use super::height_field::HeightField;
 

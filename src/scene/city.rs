@@ -1,7 +1,7 @@
 //! `scene:city`: a historic centre around a castle hill, as a block model.
 
+use collapse_log::Mesh;
 use glam::DVec2;
-use vertex_tree::Mesh;
 
 use super::building::{Building, Roof};
 use super::height_field::HeightField;

@@ -1,7 +1,7 @@
 //! A square grid of heights, z up.
 
+use collapse_log::Mesh;
 use glam::DVec3;
-use vertex_tree::Mesh;
 
 /// Heights sampled on a square grid, in metres, row by row with x running fastest.
 #[derive(Clone, Debug, PartialEq)]

@@ -22,8 +22,9 @@
 //! closed under all predecessors, whatever the camera, and every triangle it shows is one that the simplification
 //! itself went through.
 
+use collapse_log::Collapse;
 use glam::DVec3;
-use vertex_tree::{Bounds, Collapse, NONE};
+use vertex_tree::{Bounds, NONE};
 
 use super::ball::{Ball, enclosing_center, radius_around};
 

@@ -38,6 +38,7 @@ mod parts;
 mod pass;
 mod passes;
 mod prepare;
+mod stop;
 mod store;
 mod window;
 
@@ -46,19 +47,23 @@ use std::path::{Path, PathBuf};
 use std::sync::atomic::AtomicBool;
 use std::time::Instant;
 
-use vertex_tree::external::Scratch;
-use vertex_tree::{
-    Bounds, Collapse, DegreeMap, Georeference, LogCounts, LogError, LogFileError, NONE, write_log_from,
-};
+use collapse_log::external::Scratch;
+use collapse_log::{Collapse, LogCounts, LogError, LogFileError, write_log_from};
+use container::{DegreeMap, Georeference};
+use vertex_tree::{Bounds, NONE};
 
 use super::key_counts::KeyCounts;
-use super::{Options, Report};
+use super::options::Options;
+use super::order::PARTS;
+use super::remains::Remains;
+use super::report::Report;
 use crate::edge_lengths::power_of_two;
 use crate::mesh_io::{MeshIoError, Receiver};
 use crate::progress::Progress;
 use log::Log;
-use passes::{FIRST_PARITY, Interrupted, Passes};
+use passes::{FIRST_PARITY, Passes};
 use prepare::Input;
+use stop::Interrupted;
 use window::Whole;
 
 /// What a construction may take.
@@ -79,7 +84,7 @@ pub struct Limits<'a> {
 }
 
 /// More threads than this would find nothing to do.
-pub const MOST_THREADS: usize = super::order::PARTS as usize;
+pub const MOST_THREADS: usize = PARTS as usize;
 
 /// Less memory than this can not be asked for.
 pub const LEAST_MEMORY: u64 = 1 << 16;
@@ -161,10 +166,10 @@ pub fn build_within(
     }
     let memory = limits.memory.max(LEAST_MEMORY);
     check_room(triangles, &limits.temporary)?;
-    input.place(memory as usize / 2, || passes::check(limits.stop)).map_err(temporary)?;
+    input.place(memory as usize / 2, || stop::check(limits.stop)).map_err(temporary)?;
     let (blocks, live_triangles) = prepare::first_blocks(&mut input, &scratch, memory as usize, |part| {
         progress(100 + part / 10, 1000);
-        passes::check(limits.stop)
+        stop::check(limits.stop)
     })
     .map_err(temporary)?;
     let whole = Whole {
@@ -198,7 +203,7 @@ pub fn build_within(
         windows: 0,
         loaded: 0,
         roots: 0,
-        remains: super::Remains::default(),
+        remains: Remains::default(),
         followers: 0,
         rounds: 0,
     };
@@ -260,7 +265,7 @@ fn write(
         let [removed, kept, x, y, z, radius, eps] = record?;
         let center = [x, y, z].map(f32::from_bits);
         let [radius, eps] = [radius, eps].map(f32::from_bits);
-        passes::check(stop)?;
+        stop::check(stop)?;
         Ok(Collapse { removed, kept, bounds: Bounds { center, radius, eps } })
     });
     write_log_from(output, counts, georeference, positions, triangles, collapses)
@@ -308,7 +313,7 @@ impl Receiver for Receiving<'_> {
             let vertex = self.input.vertices() as usize;
             return Err(self.fail(LogError::BadPosition { vertex, position: short }.into()));
         }
-        let outcome = passes::check(self.limits.stop).and_then(|()| self.input.push_position(position));
+        let outcome = stop::check(self.limits.stop).and_then(|()| self.input.push_position(position));
         self.keep(outcome)
     }
 
@@ -318,7 +323,7 @@ impl Receiver for Receiving<'_> {
             let (triangle, vertices) = (self.input.triangles.len() as usize, vertices as usize);
             return Err(self.fail(LogError::CornerOutOfRange { triangle, vertex, vertices }.into()));
         }
-        let outcome = passes::check(self.limits.stop).and_then(|()| self.input.triangles.push(corners));
+        let outcome = stop::check(self.limits.stop).and_then(|()| self.input.triangles.push(corners));
         self.keep(outcome)
     }
 

@@ -18,7 +18,6 @@ use std::ops::Range;
 use glam::Vec3;
 use vertex_tree::NONE;
 
-use super::AT_ONCE;
 use super::candidates::{Candidates, Edges, State};
 use super::key_counts::KeyCounts;
 use super::legality::obstacle;
@@ -30,6 +29,9 @@ use super::samples::Samples;
 use super::stall::Stall;
 use super::surface::{Spoke, Surface};
 use crate::parallel;
+
+/// Vertices that a thread prepares at once.
+pub(super) const AT_ONCE: usize = 1 << 15;
 
 /// How a measured distance counts against keys that are not measured: with this times its square. Keys are mean squared
 /// distances, less than the square of the largest. With 1, only the worst surprises are put off, at the cost of 7 %
@@ -493,7 +495,7 @@ impl Builder {
         let spacing = (sides[0] / count).max((sides[0] * sides[1] / count).sqrt());
         let cell = if spacing > 0.0 { 2.0 * spacing * reach } else { 1.0 };
         let mut edges = std::mem::take(&mut surface.virtual_edges);
-        edges.search(surface, &vertices, cell);
+        edges.search(&surface.positions, &surface.components(), &vertices, cell);
         surface.virtual_edges = edges;
         for v in vertices {
             if surface.virtual_edges.partners(v).next().is_some() {

@@ -3,8 +3,8 @@
 //! Vertices are sorted along the Z-order curve (Morton 1966) through a grid of 1024 cells a side over the bounding
 //! box, so that a star, and the stars around it, share cache lines whatever the order of the input.
 
+use collapse_log::z_order;
 use glam::Vec3;
-use vertex_tree::z_order;
 
 /// The curve through a box.
 #[derive(Clone, Copy, Debug)]

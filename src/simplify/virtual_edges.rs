@@ -9,8 +9,6 @@ use std::cmp::Ordering;
 use glam::Vec3;
 use vertex_tree::NONE;
 
-use super::surface::Surface;
-
 /// Each vertex is paired with the nearest vertices of this many other components, as far as they are in its own or a
 /// neighbouring cell.
 const PARTNERS: usize = 3;
@@ -71,18 +69,19 @@ impl VirtualEdges {
         }
     }
 
-    /// Adds pairs among `vertices` that are at most as far apart as neighbouring cells of size `cell` allow.
-    pub fn search(&mut self, surface: &Surface, vertices: &[u32], cell: f32) {
-        let component = surface.components();
-        let grid = Grid::new(&surface.positions, vertices, cell);
+    /// Adds pairs among `vertices` that are at most as far apart as neighbouring cells of size `cell` allow. `component` says
+    /// of all vertices which one they are in.
+    pub fn search(&mut self, positions: &[Vec3], component: &[u32], vertices: &[u32], cell: f32) {
+        let position = |v: u32| positions[v as usize];
+        let grid = Grid::new(positions, vertices, cell);
         for &v in vertices {
             let mut nearest: Vec<Partner> = Vec::with_capacity(PARTNERS + 1);
-            grid.for_each_near(surface.position(v), v, |w| {
+            grid.for_each_near(position(v), v, |w| {
                 if component[w as usize] == component[v as usize] {
                     return;
                 }
                 let partner = Partner {
-                    distance: surface.position(v).distance_squared(surface.position(w)),
+                    distance: position(v).distance_squared(position(w)),
                     apart: w.abs_diff(v),
                     vertex: w,
                 };
@@ -101,7 +100,7 @@ impl VirtualEdges {
             });
             self.pairs.extend(nearest.into_iter().map(|n| [v, n.vertex]));
         }
-        self.index(surface.positions.len());
+        self.index(positions.len());
     }
 }
 

@@ -2,7 +2,7 @@
 
 use glam::{DMat3, DQuat, DVec3};
 
-use super::ViewError;
+use super::checks::ViewError;
 use super::checks::{check_aspect, check_eye, check_fov, check_orientation};
 
 /// A perspective camera: as recorded in a path, and as a renderer has it.

@@ -1,10 +1,11 @@
 //! Implicit dependencies of meta-nodes, against the closure by brute force.
 
+use foldfront::collapse_log::CollapseLog;
 use foldfront::cut::Displayed;
 use foldfront::engine::{Engine, Settings};
 use foldfront::oracle::Oracle;
 use foldfront::refine::Strategy;
-use foldfront::vertex_tree::{CollapseLog, Hierarchy, NONE, NullSink};
+use foldfront::vertex_tree::{NONE, NullSink, Hierarchy};
 use meta_node::{BuildOptions, Dependencies, MetaNodeTree};
 
 use crate::common::backends::meta_node_file;

@@ -3,9 +3,9 @@
 use std::path::Path;
 use std::sync::atomic::AtomicBool;
 
+use foldfront::collapse_log::read_log;
 use foldfront::mesh_io::{MeshIoError, Receiver};
 use foldfront::simplify::{LEAST_MEMORY, Limits, Report, build_within};
-use foldfront::vertex_tree::read_log;
 use foldfront::{CollapseLog, Mesh};
 
 use crate::hierarchy::{check, options, simplify};

@@ -20,7 +20,7 @@ fn a_hierarchy_is_built_described_and_verified() {
     let place = Workplace::new();
     let built = place.succeed("build grid.ply -o grid.log");
     assert_eq!(place.names("."), ["descent.path", "grid.log", "grid.ply"]);
-    let log = vertex_tree::read_log(&place.file("grid.log")).unwrap();
+    let log = collapse_log::read_log(&place.file("grid.log")).unwrap();
     assert_eq!(log.mesh, grid());
     let collapses = log.collapses.len();
     assert!(collapses > 100, "only {collapses} collapses of 144 vertices");
@@ -63,14 +63,14 @@ fn info_says_where_a_mesh_lies_in_the_world() {
     let place = Workplace::new();
     place.succeed("build grid.ply -o grid.log");
     assert!(!place.succeed("info grid.log").contains("origin"));
-    let mut log = vertex_tree::read_log(&place.file("grid.log")).unwrap();
-    log.mesh.georeference = vertex_tree::Georeference {
+    let mut log = collapse_log::read_log(&place.file("grid.log")).unwrap();
+    log.mesh.georeference = container::Georeference {
         origin: [691_000.5, 5_334_000.0, 0.0],
         coordinate_system: "EPSG:25832".to_owned(),
-        rounding: vertex_tree::Rounding { largest_move: 0.0125, median_edge: 2.5 },
+        rounding: container::Rounding { largest_move: 0.0125, median_edge: 2.5 },
         ..Default::default()
     };
-    vertex_tree::write_log(&place.file("there.log"), &log).unwrap();
+    collapse_log::write_log(&place.file("there.log"), &log).unwrap();
     let lines = [
         "origin 691000.5 5334000 0",
         "coordinate system EPSG:25832",

@@ -291,15 +291,15 @@ fn a_damaged_hierarchy_is_named_with_the_offset() {
 fn verify_finds_bounds_that_are_not_nested() {
     let place = Workplace::new();
     place.succeed("build grid.ply -o grid.log");
-    let mut log = vertex_tree::read_log(&place.file("grid.log")).unwrap();
+    let mut log = collapse_log::read_log(&place.file("grid.log")).unwrap();
     let parent = log.forest().unwrap().parent[0];
     log.collapses[0].bounds.radius *= 100.0;
-    vertex_tree::write_log(&place.file("wide.log"), &log).unwrap();
+    collapse_log::write_log(&place.file("wide.log"), &log).unwrap();
     let said = format!("node 0 is not within its parent {parent}");
     place.fail("verify wide.log", 1, &["wide.log", &said]);
     log.collapses[0].bounds.radius /= 100.0;
     log.collapses[0].bounds.eps = 1e9;
-    vertex_tree::write_log(&place.file("rough.log"), &log).unwrap();
+    collapse_log::write_log(&place.file("rough.log"), &log).unwrap();
     place.fail("verify rough.log", 1, &["rough.log", &said]);
 }
 

@@ -8,9 +8,10 @@ use std::path::{Path, PathBuf};
 use std::sync::atomic::AtomicBool;
 
 use foldfront::Mesh;
+use foldfront::collapse_log::{LogFile, read_log};
 use foldfront::compare::Subject;
+use foldfront::container::{DegreeMap, Georeference, Rounding};
 use foldfront::store::{self, Backend, BuildOptions, Store, WriteLimits};
-use foldfront::vertex_tree::{DegreeMap, Georeference, LogFile, Rounding, read_log};
 
 fn frozen(name: &str) -> PathBuf {
     Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/frozen").join(name)

@@ -2,7 +2,7 @@
 
 #![expect(clippy::disallowed_methods, reason = "random shapes and motions, or figures to compare with")]
 
-use foldfront::vertex_tree::DegreeMap;
+use foldfront::container::DegreeMap;
 
 use super::heights::{flat_tile, zip};
 use super::*;

@@ -4,8 +4,9 @@
 
 use std::sync::atomic::AtomicBool;
 
+use foldfront::collapse_log::read_log;
+use foldfront::container::Georeference;
 use foldfront::simplify::{LEAST_MEMORY, Limits, Options, build_within};
-use foldfront::vertex_tree::{Georeference, read_log};
 
 use super::*;
 

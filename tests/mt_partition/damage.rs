@@ -4,7 +4,7 @@ use std::sync::Arc;
 
 use foldfront::Hierarchy;
 use foldfront::vertex_tree::source::MemorySource;
-use mt_partition::{BuildOptions, MAGIC, MtError, MtFile};
+use mt_partition::{BuildOptions, FileError, MAGIC, MtError, MtFile};
 
 use crate::common::sink::StrictMesh;
 use crate::{all_around, ball_log, finest};
@@ -70,15 +70,15 @@ fn every_truncated_file_is_refused() {
     for length in 0..bytes.len() {
         let error = open(bytes[..length].to_vec()).expect_err("cut short");
         let is_expected = match &error {
-            MtError::NotThis { .. } => length < MAGIC.len(),
-            MtError::Length { actual, .. } => *actual == length as u64,
+            MtError::File(FileError::Foreign { .. }) => length < MAGIC.len(),
+            MtError::File(FileError::Length { actual, .. }) => *actual == length as u64,
             _ => false,
         };
         assert!(is_expected, "{length} bytes: {error}");
     }
     let mut longer = bytes;
     longer.push(0);
-    assert!(matches!(open(longer), Err(MtError::Length { .. })));
+    assert!(matches!(open(longer), Err(MtError::File(FileError::Length { .. }))));
 }
 
 /// Counts that ask for the world, with the checksum of the header made right again: refused before anything is allocated.
@@ -106,7 +106,7 @@ fn huge_counts_are_refused() {
 #[test]
 fn something_else_is_refused() {
     let error = open(b"FFCOLLOG and so on".to_vec()).unwrap_err();
-    assert!(matches!(error, MtError::NotThis { .. }), "{error}");
+    assert!(matches!(error, MtError::File(FileError::Foreign { .. })), "{error}");
     for (offset, message) in [(8, "version 3"), (12, "attribute stride 1")] {
         let mut other = small();
         other[offset] += 1;

@@ -6,7 +6,9 @@ use std::sync::atomic::AtomicBool;
 
 use foldfront::vertex_tree::source::MemorySource;
 use foldfront::{CollapseLog, Hierarchy};
-use mt_partition::{BuildOptions, CacheMode, Memory, MtError, MtFile, Workspace, WriteReport, write_within};
+use mt_partition::{
+    BuildOptions, CacheMode, Memory, MtError, MtFile, Workspace, WorkspaceError, WriteReport, write_within,
+};
 
 use crate::common::data;
 use crate::common::sink::StrictMesh;
@@ -94,11 +96,11 @@ fn what_goes_wrong_is_said_and_leaves_nothing() {
     let workspace = |folder: &str, stop| Workspace { folder: folder.into(), memory: 0, stop };
     let stop = AtomicBool::new(true);
     let outcome = write_within(&path, &log, &options, &workspace(".", &stop));
-    assert!(matches!(outcome, Err(MtError::Interrupted)), "{outcome:?}");
+    assert!(matches!(outcome, Err(MtError::Workspace(WorkspaceError::Interrupted))), "{outcome:?}");
     let stop = AtomicBool::new(false);
     let outcome = write_within(&path, &log, &options, &workspace("/nowhere/at/all", &stop));
     assert!(
-        matches!(&outcome, Err(MtError::Temporary { folder, .. }) if folder == Path::new("/nowhere/at/all")),
+        matches!(&outcome, Err(MtError::Workspace(WorkspaceError::Temporary { folder, .. })) if folder == Path::new("/nowhere/at/all")),
         "{outcome:?}"
     );
     let outcome = write_within(Path::new("/nowhere/within.mt"), &log, &options, &workspace(".", &stop));

@@ -3,7 +3,7 @@
 use std::path::PathBuf;
 
 use foldfront::Mesh;
-use foldfront::vertex_tree::Georeference;
+use foldfront::container::Georeference;
 use libtest_mimic::Trial;
 
 use crate::hierarchy::{errors_are_honest, is_deterministic, simplify_and_check};

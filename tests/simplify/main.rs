@@ -15,10 +15,10 @@ mod within;
 use common::{Random, meshes};
 use foldfront::Mesh;
 use foldfront::bvh::Bvh;
+use foldfront::collapse_log::LogError;
 use foldfront::cut::Displayed;
 use foldfront::scene::SceneKind;
 use foldfront::simplify::{Options, build};
-use foldfront::vertex_tree::LogError;
 use glam::DVec3;
 use hierarchy::{check, errors_are_honest, is_deterministic, simplify, simplify_and_check};
 

@@ -4,10 +4,11 @@ use std::path::Path;
 use std::sync::atomic::{AtomicBool, Ordering};
 
 use foldfront::Mesh;
+use foldfront::collapse_log::LogError;
+use foldfront::container::Georeference;
 use foldfront::mesh_io::{MeshIoError, Receiver};
 use foldfront::scene::SceneKind;
 use foldfront::simplify::{LEAST_MEMORY, Limits, OutOfCoreError, build_within};
-use foldfront::vertex_tree::{Georeference, LogError};
 
 use crate::common::{Random, meshes};
 use crate::hierarchy::options;

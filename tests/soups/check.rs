@@ -5,12 +5,12 @@ use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::path::Path;
 use std::sync::atomic::AtomicBool;
 
+use foldfront::collapse_log::read_log;
 use foldfront::compare::Subject;
 use foldfront::criterion::Criterion;
 use foldfront::mesh_io::{MeshIoError, Receiver};
 use foldfront::simplify::{LEAST_MEMORY, Limits, Options, Report, build, build_within};
 use foldfront::store::{self, Backend, BuildOptions, Store};
-use foldfront::vertex_tree::read_log;
 use foldfront::view::View;
 use foldfront::{CollapseLog, Mesh};
 

@@ -2,21 +2,22 @@
 
 use std::io;
 
-use vertex_tree::{Georeference, LogSource, NONE};
+use collapse_log::LogSource;
+use container::Georeference;
+use vertex_tree::NONE;
 
-use crate::build::{BuildOptions, WriteReport};
 use crate::error::{Failure, XfmError};
 use crate::format::{Header, OFFSET_BITS, VERSION};
 use crate::half_edges::{BOUNDARY, HalfEdge, triangle_of};
 use crate::layout::Layout;
 use crate::nesting::{Nesting, Node};
 use crate::numbering::{Levels, MOST_FACES, MOST_LEVELS, face_half_edge, node_half_edge};
+use crate::options::{BuildOptions, WriteReport};
 use crate::quantize::Scale;
 use crate::renumber::Renumbered;
 use crate::replay::{Merge, Replay, Replayed};
 use crate::storage::{Elements, Storage};
 use crate::surface::{Leaf, Surface};
-use crate::writing;
 
 /// A log arranged for an XFM file.
 pub(crate) struct Arranged<S: Storage> {
@@ -96,7 +97,7 @@ impl<S: Storage> Arranged<S> {
         let blocks = layout.leaf_blocks * header.block_bytes(0, true)
             + (layout.blocks - layout.leaf_blocks) * header.block_bytes(0, false)
             + header.nodes * header.node_bytes() as u64;
-        header.length = writing::length(&header, blocks, &georeference).map_err(Failure::Output)?;
+        header.length = header.file_length(blocks, &georeference).map_err(Failure::Output)?;
         let most = 1 << OFFSET_BITS;
         if header.length > most {
             return Err(XfmError::TooLarge { what: "bytes", count: header.length, most }.into());

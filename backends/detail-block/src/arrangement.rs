@@ -5,14 +5,15 @@ use std::cmp::Reverse;
 use std::io::{self, Cursor, Write};
 use std::path::Path;
 
-use vertex_tree::{Collapse, CollapseLog, Mesh, NormalCone};
+use collapse_log::{Collapse, CollapseLog, Mesh};
+use vertex_tree::NormalCone;
 
 use crate::arrange::Arranged;
-use crate::build::{BuildOptions, WriteReport};
 use crate::error::{Failure, XfmError};
 use crate::half_edges::triangle_of;
 use crate::nesting::Node;
 use crate::numbering::{Owner, owner};
+use crate::options::{BuildOptions, WriteReport};
 use crate::storage::Memory;
 use crate::surface::Surface;
 

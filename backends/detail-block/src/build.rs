@@ -8,59 +8,13 @@
 use std::path::Path;
 use std::sync::atomic::Ordering;
 
-use vertex_tree::external::Workspace;
-use vertex_tree::{CollapseLog, LogSource};
+use collapse_log::external::{Workspace, WorkspaceError};
+use collapse_log::{CollapseLog, LogSource};
 
 use crate::arrange::Arranged;
 use crate::error::XfmError;
+use crate::options::{BuildOptions, WriteReport};
 use crate::storage::{Disk, Memory, Storage};
-
-/// How to build a file.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct BuildOptions {
-    /// Levels of a detail block, 1 to 5. The paper found 4 efficient.
-    pub levels: u32,
-    /// Whether to store nodes in 30 bytes instead of 52. Positions then move to a lattice of 2^19 points a side.
-    pub quantize: bool,
-    /// Whether to nest bounds over what splits need beyond the tree, so that nothing is ever forced.
-    pub nest_needs: bool,
-}
-
-impl Default for BuildOptions {
-    fn default() -> Self {
-        Self { levels: 4, quantize: false, nest_needs: true }
-    }
-}
-
-/// What a build did.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-#[non_exhaustive]
-pub struct WriteReport {
-    /// Triangles of the fully refined mesh.
-    pub triangles: u64,
-    /// Input triangles that name a vertex twice: never shown, left out.
-    pub degenerate: u64,
-    /// Vertices that were added to split non-manifold ones apart.
-    pub added_vertices: u64,
-    /// Non-manifold edges that were cut.
-    pub cut_edges: u64,
-    /// Vertices that the log removes and that stay, as that would not have been a collapse of the manifold mesh.
-    pub left_out: u64,
-    /// Nodes.
-    pub nodes: u64,
-    /// Roots of the forest.
-    pub roots: u64,
-    /// Vertices of the base mesh.
-    pub initial_vertices: u64,
-    /// Faces of the base mesh.
-    pub initial_faces: u64,
-    /// Detail blocks.
-    pub blocks: u64,
-    /// Those of them without children.
-    pub leaf_blocks: u64,
-    /// Bytes of the file.
-    pub bytes: u64,
-}
 
 /// Builds a file in memory: written to a temporary name, synced, then renamed.
 ///
@@ -74,7 +28,7 @@ pub fn write(path: &Path, log: &CollapseLog, options: &BuildOptions) -> Result<W
 /// Builds a file from a log that may be larger than memory. The file is the same whatever the memory.
 ///
 /// # Errors
-/// As for [`write()`], and [`XfmError::Source`], [`XfmError::Temporary`], [`XfmError::Interrupted`]. Nothing is left behind.
+/// As for [`write()`], and [`XfmError::Source`] and [`XfmError::Workspace`]. Nothing is left behind.
 pub fn write_within(
     path: &Path,
     log: &dyn LogSource,
@@ -87,8 +41,9 @@ pub fn write_within(
     } else {
         write_on(path, log, options, &Disk::new(workspace), &workspace.folder)
     };
-    outcome
-        .map_err(|error| if workspace.stop.load(Ordering::Relaxed) { XfmError::Interrupted } else { error })
+    outcome.map_err(|error| {
+        if workspace.stop.load(Ordering::Relaxed) { WorkspaceError::Interrupted.into() } else { error }
+    })
 }
 
 /// Bytes of memory with which a file of so many vertices and triangles is built without temporary files.

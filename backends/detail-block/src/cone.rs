@@ -5,8 +5,10 @@
 
 use vertex_tree::NormalCone;
 
-use crate::node::NO_CONE;
 use crate::vector::{self, Vector};
+
+/// The sine of a node without a normal cone.
+pub(crate) const NO_CONE: f32 = 2.0;
 
 /// An angle below 90 degrees; `None` for all others.
 pub(crate) type Angle = Option<(f64, f64)>;

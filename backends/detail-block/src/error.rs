@@ -1,15 +1,22 @@
 //! What can be wrong with a file, and with building one.
 
 use std::io;
-use std::path::{Path, PathBuf};
+use std::path::Path;
 
-use vertex_tree::LogError;
-use vertex_tree::sections::SectionError;
+use collapse_log::LogError;
+use collapse_log::external::WorkspaceError;
+use container::{FileError, SectionError};
 
 /// An XFM file could not be written or is not what it should be.
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
 pub enum XfmError {
+    /// What can be wrong with a file of any format.
+    #[error(transparent)]
+    File(#[from] FileError),
+    /// Temporary files, or somebody wanted it to end.
+    #[error(transparent)]
+    Workspace(#[from] WorkspaceError),
     /// The log that a file was to be built from does not fit its mesh.
     #[error("the collapse log does not fit its mesh: {0}")]
     Log(#[from] LogError),
@@ -51,17 +58,6 @@ pub enum XfmError {
         /// Why.
         source: io::Error,
     },
-    /// A temporary file can not be written or read.
-    #[error("temporary files in {}: {source}", folder.display())]
-    Temporary {
-        /// Where they are made.
-        folder: PathBuf,
-        /// Why.
-        source: io::Error,
-    },
-    /// Somebody wanted the construction to end.
-    #[error("interrupted")]
-    Interrupted,
     /// Reading failed.
     #[error("{file}: reading {length} bytes at offset {offset}: {source}")]
     Read {
@@ -73,12 +69,6 @@ pub enum XfmError {
         length: u64,
         /// Why.
         source: io::Error,
-    },
-    /// The file is something else.
-    #[error("{file}: not an XFM file: it does not start with \"FFXFMESH\"")]
-    NotXfm {
-        /// The file or store.
-        file: String,
     },
     /// A field of the header or of a table has a value that it can not have.
     #[error("{file}: offset {offset}: {field} is {value}, {expected}")]
@@ -93,34 +83,6 @@ pub enum XfmError {
         value: u64,
         /// What was expected.
         expected: &'static str,
-    },
-    /// The file is shorter or longer than its header says.
-    #[error("{file}: {actual} bytes, but its header asks for {expected}")]
-    FileLength {
-        /// The file or store.
-        file: String,
-        /// What the header says.
-        expected: u64,
-        /// What there is.
-        actual: u64,
-    },
-    /// Bytes have changed since the file was written.
-    #[error("{file}: offset {offset}: checksum of the {section} does not match")]
-    Checksum {
-        /// The file or store.
-        file: String,
-        /// Start of the damaged section.
-        offset: u64,
-        /// Its name.
-        section: &'static str,
-    },
-    /// The sections of the file are not what they should be.
-    #[error("{file}: {source}")]
-    Sections {
-        /// The file or store.
-        file: String,
-        /// What is wrong with them.
-        source: SectionError,
     },
     /// A detail block does not hold what it should, though it may be intact.
     #[error("{file}: offset {offset}: block {block} is damaged: {reason}")]
@@ -151,11 +113,11 @@ pub enum XfmError {
 impl XfmError {
     /// What is wrong with the sections of a file, under the name that it has always had.
     pub(crate) fn of_sections(file: &str, error: SectionError) -> Self {
-        let file = file.to_owned();
         match error {
-            SectionError::Io { offset, length, source } => Self::Read { file, offset, length, source },
-            SectionError::FileLength { expected, actual } => Self::FileLength { file, expected, actual },
-            source => Self::Sections { file, source },
+            SectionError::Io { offset, length, source } => {
+                Self::Read { file: file.to_owned(), offset, length, source }
+            }
+            error => FileError::of_sections(file, error).into(),
         }
     }
 }
@@ -194,7 +156,7 @@ impl Failure {
     /// The error for temporary files in a folder and a file to be written.
     pub fn into_error(self, folder: &Path, file: &Path) -> XfmError {
         match self {
-            Self::Temporary(source) => XfmError::Temporary { folder: folder.to_owned(), source },
+            Self::Temporary(source) => WorkspaceError::Temporary { folder: folder.to_owned(), source }.into(),
             Self::Source(source) => XfmError::Source { source },
             Self::Output(source) => XfmError::Write { file: file.display().to_string(), source },
             Self::Other(error) => error,

@@ -3,9 +3,9 @@
 use std::path::Path;
 use std::sync::Arc;
 
-use vertex_tree::sections::Sections;
+use container::{Georeference, Sections};
 use vertex_tree::source::{FileSource, MappedSource, PageSource};
-use vertex_tree::{Bounds, Georeference, NodeId};
+use vertex_tree::{Bounds, NodeId};
 
 use crate::block::{Block, resident_bytes};
 use crate::error::XfmError;

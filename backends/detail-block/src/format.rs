@@ -25,7 +25,7 @@
 //!    136      8  length of the file
 //!    144      4  CRC-32 of bytes 0 to 143
 //!    148      4  zeros
-//!    152         table of sections, see `vertex_tree::sections`:
+//!    152         table of sections, see `container`:
 //!                GEOR  where the mesh lies in the world, if that is to be said
 //!                BASV  24 V, initial vertices: position and normal, 3 f32 each
 //!                BAST  24 F, initial faces: three initial vertices, and the reverses of the half-edges that start there
@@ -54,6 +54,10 @@
 //!
 //! Parents have lower numbers than their children, and blocks than their child blocks, so walks upwards end even in a
 //! damaged file. Half-edge numbers: see `numbering`.
+
+use std::io;
+
+use container::Georeference;
 
 use crate::numbering::Levels;
 use crate::quantize::Scale;
@@ -129,6 +133,12 @@ impl Header {
             let fits = rest == 0 && (1..=u64::from(self.levels.full())).contains(&count);
             fits.then_some((count as u32, is_leaf))
         })
+    }
+
+    /// How long the file will be with so many bytes of blocks.
+    pub fn file_length(&self, blocks: u64, georeference: &Georeference) -> io::Result<u64> {
+        let [vertices, faces, roots, index] = self.table_bytes();
+        container::file_length(HEADER_BYTES, georeference, &[], &[vertices, faces, roots, blocks, index])
     }
 
     pub fn encode(&self) -> Vec<u8> {

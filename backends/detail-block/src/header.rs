@@ -1,5 +1,6 @@
 //! Reading the header.
 
+use container::FileError;
 use vertex_tree::source::PageSource;
 
 use crate::error::XfmError;
@@ -29,10 +30,10 @@ pub(crate) fn read_header(source: &dyn PageSource) -> Result<Header, XfmError> {
     let mut bytes = vec![0; HEADER_BYTES.min(actual) as usize];
     read(source, 0, &mut bytes)?;
     if !bytes.starts_with(&MAGIC) {
-        return Err(XfmError::NotXfm { file: file() });
+        return Err(FileError::Foreign { file: file(), what: "not an XFM file", magic: "FFXFMESH" }.into());
     }
     if actual < HEADER_BYTES {
-        return Err(XfmError::FileLength { file: file(), expected: HEADER_BYTES, actual });
+        return Err(FileError::Length { file: file(), expected: HEADER_BYTES, actual }.into());
     }
     let word = |at: usize| long(&bytes[at..at + 4]) as u32;
     let count = |at: usize| long(&bytes[at..at + 8]);
@@ -43,7 +44,7 @@ pub(crate) fn read_header(source: &dyn PageSource) -> Result<Header, XfmError> {
         return field(8, "the version", word(8).into(), "expected 1 or 2");
     }
     if crc32fast::hash(&bytes[..144]) != word(144) {
-        return Err(XfmError::Checksum { file: file(), offset: 0, section: "header" });
+        return Err(FileError::Checksum { file: file(), offset: 0, section: "header" }.into());
     }
     if word(12) != 0 {
         return field(12, "the attribute stride", word(12).into(), "expected 0");
@@ -97,7 +98,7 @@ pub(crate) fn read_header(source: &dyn PageSource) -> Result<Header, XfmError> {
         length: count(136),
     };
     if header.length != actual {
-        return Err(XfmError::FileLength { file: file(), expected: header.length, actual });
+        return Err(FileError::Length { file: file(), expected: header.length, actual }.into());
     }
     Ok(header)
 }

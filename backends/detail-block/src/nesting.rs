@@ -25,7 +25,7 @@ use crate::cone;
 use crate::error::{Failure, XfmError};
 use crate::half_edges::{Adjacent, BOUNDARY, triangle_of};
 use crate::quantize::{self, Scale};
-use crate::replay::Step;
+use crate::step::Step;
 use crate::storage::{Elements, Storage};
 use crate::surface::Surface;
 use crate::vector::{self, Vector};

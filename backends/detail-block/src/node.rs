@@ -25,9 +25,6 @@ use crate::quantize::{self, Scale};
 pub(crate) const PLAIN_BYTES: usize = 52;
 /// Bytes of a quantised node.
 pub(crate) const QUANTISED_BYTES: usize = 30;
-/// The sine of a node without a normal cone.
-pub(crate) const NO_CONE: f32 = 2.0;
-
 /// What is stored of a node, decoded.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) struct Stored {
@@ -116,6 +113,7 @@ impl Stored {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::cone::NO_CONE;
 
     #[test]
     fn nodes_have_the_promised_size_and_come_back() {

@@ -4,6 +4,8 @@
 //! Decoding is a few exact or correctly rounded operations, the same everywhere; the builder computes with the decoded
 //! values, so that spheres and cones are nested as stored.
 
+use crate::cone::NO_CONE;
+
 /// Bits of a coordinate.
 const COORDINATE_BITS: u32 = 19;
 const COORDINATE_MASK: u64 = (1 << COORDINATE_BITS) - 1;
@@ -117,7 +119,7 @@ pub(crate) fn sine(sine: f32) -> u64 {
 #[inline]
 pub(crate) fn decode_sine(code: u64) -> f32 {
     let code = (code >> SINE_SHIFT) as u8;
-    if code > SINE_ONE { crate::node::NO_CONE } else { f32::from(code) / f32::from(SINE_ONE) }
+    if code > SINE_ONE { NO_CONE } else { f32::from(code) / f32::from(SINE_ONE) }
 }
 
 #[cfg(test)]

@@ -21,8 +21,8 @@
 use std::collections::VecDeque;
 
 use bytemuck::{Pod, Zeroable};
-use vertex_tree::external::Sorter;
-use vertex_tree::{Collapse, LogError, LogSource, z_order};
+use collapse_log::external::Sorter;
+use collapse_log::{Collapse, LogError, LogSource, z_order};
 
 use crate::error::{Failure, XfmError};
 use crate::half_edges::{BOUNDARY, HalfEdge, Reverses, triangle_of};
@@ -172,10 +172,10 @@ impl<S: Storage> Renumbered<S> {
         Ok(Self { kept: in_order, eps, places, faces: Faces(faces), input, corners, degenerate })
     }
 
-    /// The extent of the mesh: see [`Mesh::extent`](vertex_tree::Mesh::extent).
+    /// The extent of the mesh: see [`Mesh::extent`](collapse_log::Mesh::extent).
     pub fn extent(&self) -> f64 {
         let positions = self.corners.to_vec();
-        vertex_tree::Mesh { positions, ..vertex_tree::Mesh::default() }.extent()
+        collapse_log::Mesh { positions, ..collapse_log::Mesh::default() }.extent()
     }
 }
 

@@ -39,6 +39,7 @@ use vertex_tree::NONE;
 use crate::error::Failure;
 use crate::half_edges::{Adjacent, BOUNDARY, HalfEdge, adjacent, fan, next, prev, triangle_of};
 use crate::nesting::Nesting;
+use crate::step::Step;
 use crate::storage::{Elements, Storage};
 use crate::surface::Surface;
 
@@ -259,18 +260,4 @@ impl<'s, S: Storage> Replay<'s, S> {
         }
         self.merges.push(Merge { removed: v, kept: u, edge, adjacent: [w, x, y, z], children })
     }
-}
-
-/// A collapse about to be made, for the nesting of bounds.
-pub(crate) struct Step<'a> {
-    pub removed: u32,
-    pub kept: u32,
-    pub children: [u32; 2],
-    /// The half-edges to the kept vertex and back.
-    pub edge: [HalfEdge; 2],
-    pub adjacent: Adjacent,
-    /// The half-edges that start at the removed vertex in triangles that remain.
-    pub fan: &'a [HalfEdge],
-    pub far: [u32; 2],
-    pub eps: f32,
 }

@@ -9,7 +9,7 @@ use std::path::PathBuf;
 use std::sync::atomic::AtomicBool;
 
 use bytemuck::Pod;
-use vertex_tree::external::{self, Scratch, Sorter, Workspace};
+use collapse_log::external::{self, Scratch, Sorter, Workspace};
 
 /// An array that is read and written by number.
 pub(crate) trait Elements<T> {

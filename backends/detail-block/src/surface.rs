@@ -293,7 +293,7 @@ fn find_fans<S: Storage>(
     faces: &mut Faces<S::Array<Face>>,
     input: &mut S::Array<u32>,
     storage: &S,
-) -> io::Result<vertex_tree::external::Sorter<3>> {
+) -> io::Result<collapse_log::external::Sorter<3>> {
     let mut sorter = storage.sorter::<3>(12);
     let mut visited = storage.array(faces.0.len(), 0_u8, 3);
     let mut fan = Vec::new();

@@ -1,7 +1,6 @@
 //! Reading all that comes with the header: everything but the blocks.
 
-use vertex_tree::Georeference;
-use vertex_tree::sections::{BY_PAGE, Kind, SectionError, Sections};
+use container::{BY_PAGE, FileError, Georeference, Kind, SectionError, Sections};
 use vertex_tree::source::PageSource;
 
 use crate::error::XfmError;
@@ -63,7 +62,7 @@ impl Tables {
         // Every block has one node at least, so what is allocated next is no more than the file's own size.
         let (expected, actual) = (next + header.blocks * header.block_bytes(1, true), source.len());
         if actual < expected {
-            return Err(XfmError::FileLength { file: source.name().to_owned(), expected, actual });
+            return Err(FileError::Length { file: source.name().to_owned(), expected, actual }.into());
         }
         let mut bytes = [const { Vec::new() }; 4];
         for (i, (_, section)) in KINDS.into_iter().enumerate() {
@@ -72,7 +71,7 @@ impl Tables {
             let sum = bytes[i].split_off(lengths[i] as usize);
             if u64::from(crc32fast::hash(&bytes[i])) != long(&sum) {
                 let file = source.name().to_owned();
-                return Err(XfmError::Checksum { file, offset: at[i], section });
+                return Err(FileError::Checksum { file, offset: at[i], section }.into());
             }
         }
         let (georeference, sections) = (Georeference::default(), Sections::default());

@@ -5,14 +5,14 @@
 use std::io::{self, Seek, Write};
 use std::path::Path;
 
-use vertex_tree::sections::{self, BY_PAGE, Kind, SectionWriter};
-use vertex_tree::{Georeference, NONE, NodeId, output};
+use container::{BY_PAGE, Kind, SectionWriter, output};
+use vertex_tree::{NONE, NodeId};
 
 use crate::arrange::Arranged;
-use crate::build::WriteReport;
 use crate::error::Failure;
-use crate::format::{HEADER_BYTES, Header, OFFSET_BITS, block_sum};
+use crate::format::{HEADER_BYTES, OFFSET_BITS, block_sum};
 use crate::node::Stored;
+use crate::options::WriteReport;
 use crate::storage::{Elements, Storage};
 
 impl<S: Storage> Arranged<S> {
@@ -191,12 +191,6 @@ const KINDS: [(Kind, u32); 5] = [
     (Kind::PAGES, BY_PAGE),
     (Kind::PAGE_TABLE, 0),
 ];
-
-/// How long the file with a header and so many bytes of blocks will be.
-pub(crate) fn length(header: &Header, blocks: u64, georeference: &Georeference) -> io::Result<u64> {
-    let [vertices, faces, roots, index] = header.table_bytes();
-    sections::file_length(HEADER_BYTES, georeference, &[], &[vertices, faces, roots, blocks, index])
-}
 
 fn put(out: &mut impl Write, words: &[u32]) -> Result<(), Failure> {
     words.iter().try_for_each(|word| out.write_all(&word.to_le_bytes())).map_err(Failure::Output)

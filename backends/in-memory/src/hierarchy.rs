@@ -2,7 +2,7 @@
 //!
 //! Leaves are numbered depth-first, the side of the kept vertex before the other, so every subtree is an interval of
 //! leaves, and the vertex shown for a folded node is the first leaf of its interval, as a collapse keeps the place of the
-//! kept vertex: see [`StarMesh`](vertex_tree::StarMesh).
+//! kept vertex: see [`StarMesh`](star_mesh::StarMesh).
 //!
 //! Nodes are numbered by octaves of their error, from large to small, and depth-first within an octave. The nodes that a
 //! front can reach next have errors that are close in number wherever they are close in space: what a frame changes lies
@@ -11,7 +11,9 @@
 //!
 //! What belongs to a node, its removed vertex and the triangles that it brings, is sorted like the nodes.
 
-use vertex_tree::{Bounds, CollapseLog, Forest, LeafTriangle, LogError, NONE, NodeId};
+use collapse_log::{CollapseLog, Forest, LogError};
+use star_mesh::LeafTriangle;
+use vertex_tree::{Bounds, NONE, NodeId};
 
 /// An inner node: one cache line that holds all that unfolding it asks for.
 #[derive(Clone, Copy, Debug)]

@@ -1,7 +1,8 @@
 //! The reference backend: the whole hierarchy resident, nothing clever.
 //!
 //! ```
-//! # use vertex_tree::{CollapseLog, NullSink, Hierarchy, VertexTree};
+//! # use collapse_log::CollapseLog;
+//! # use vertex_tree::{NullSink, Hierarchy, VertexTree};
 //! # use in_memory::{InMemoryHierarchy, InMemoryTree};
 //! # use std::sync::Arc;
 //! # fn main() -> Result<(), Box<dyn std::error::Error>> {

@@ -2,12 +2,12 @@
 
 use std::sync::Arc;
 
+use star_mesh::{LeafTriangle, StarMesh};
 use vertex_tree::{
-    Bounds, Hierarchy, LeafTriangle, MeshSink, NONE, NodeId, PageStats, StarMesh, Step, TreeError,
-    TriangleId, VertexId, VertexTree, prefetch,
+    Bounds, MeshSink, NONE, NodeId, PageStats, Step, TreeError, TriangleId, VertexId, Hierarchy, VertexTree, prefetch,
 };
 
-use crate::InMemoryHierarchy;
+use super::hierarchy::InMemoryHierarchy;
 use crate::hierarchy::Node;
 
 /// A hierarchy and the state of one front through it.

@@ -3,7 +3,7 @@
 //!
 //! Leaves are numbered in the order in which a walk in preorder meets them, the child with the kept vertex first, so
 //! that every subtree is an interval of leaves and the vertex shown for a folded node is its first leaf (design of the
-//! displayed mesh: [`StarMesh`](vertex_tree::StarMesh)). Nodes are numbered in preorder too: those below a node with `k`
+//! displayed mesh: [`StarMesh`](star_mesh::StarMesh)). Nodes are numbered in preorder too: those below a node with `k`
 //! leaves are the `k - 2` after it, and where its children are follows from how many leaves they have.
 //!
 //! The nodes, their triangles and the places of the leaves are in temporary files, and read by number through a cache; how
@@ -12,13 +12,11 @@
 use std::cell::RefCell;
 use std::io;
 use std::ops::Range;
-use std::sync::atomic::{AtomicBool, Ordering};
+use std::sync::atomic::AtomicBool;
 
-use vertex_tree::external::{Paged, Scratch, Workspace, check_stop};
-use vertex_tree::{Bounds, LogSource};
+use collapse_log::external::{Paged, check_stop};
+use vertex_tree::Bounds;
 
-use crate::arranging::{Arranging, Failure};
-use crate::error::MetaNodeError;
 use crate::subtree::Span;
 
 /// A node.
@@ -62,19 +60,7 @@ pub(crate) struct Stored {
     pub failed: Option<io::Error>,
 }
 
-impl<'a> Arrangement<'a> {
-    /// Arranges a log.
-    pub fn new(log: &dyn LogSource, workspace: &Workspace<'a>) -> Result<Self, MetaNodeError> {
-        let scratch = Scratch { folder: workspace.folder.clone() };
-        let memory = usize::try_from(workspace.memory).unwrap_or(usize::MAX) / 4;
-        let arranging = Arranging { log, scratch, memory, base_leaves: Vec::new(), stop: workspace.stop };
-        arranging.run().map_err(|error| match error {
-            Failure::Log(error) => error.into(),
-            Failure::Io(_) if workspace.stop.load(Ordering::Relaxed) => MetaNodeError::Interrupted,
-            Failure::Io(source) => MetaNodeError::Temporary { folder: workspace.folder.clone(), source },
-        })
-    }
-
+impl Arrangement<'_> {
     /// A node by its number in preorder.
     pub fn node(&self, n: u32) -> Node {
         let mut stored = self.stored.borrow_mut();

@@ -10,14 +10,30 @@ use std::io;
 use std::ops::Range;
 use std::sync::atomic::AtomicBool;
 
-use vertex_tree::external::{Scratch, Sorter, Spool, check_stop};
-use vertex_tree::{Bounds, Collapse, LogError, LogSource, NONE};
+use collapse_log::external::{Scratch, Sorter, Spool, Workspace, check_stop, too_few};
+use collapse_log::{Collapse, LogError, LogSource};
+use vertex_tree::{Bounds, NONE};
 
 use crate::arrange::{Arrangement, Stored};
+use crate::error::MetaNodeError;
 use crate::subtree::{Span, Subtree};
 
+/// Arranges a log.
+pub(crate) fn arrange<'a>(
+    log: &dyn LogSource,
+    workspace: &Workspace<'a>,
+) -> Result<Arrangement<'a>, MetaNodeError> {
+    let scratch = Scratch { folder: workspace.folder.clone() };
+    let memory = usize::try_from(workspace.memory).unwrap_or(usize::MAX) / 4;
+    let arranging = Arranging { log, scratch, memory, base_leaves: Vec::new(), stop: workspace.stop };
+    arranging.run().map_err(|error| match error {
+        Failure::Log(error) => error.into(),
+        Failure::Io(source) => workspace.error(source).into(),
+    })
+}
+
 /// What can go wrong.
-pub(crate) enum Failure {
+enum Failure {
     Log(LogError),
     Io(io::Error),
 }
@@ -51,18 +67,18 @@ impl Upper {
 }
 
 /// A log that is being arranged.
-pub(crate) struct Arranging<'a, 's> {
-    pub log: &'a dyn LogSource,
-    pub scratch: Scratch,
+struct Arranging<'a, 's> {
+    log: &'a dyn LogSource,
+    scratch: Scratch,
     /// Bytes that a sort, or what is loaded, may take.
-    pub memory: usize,
+    memory: usize,
     /// Empty at first.
-    pub base_leaves: Vec<u32>,
-    pub stop: &'s AtomicBool,
+    base_leaves: Vec<u32>,
+    stop: &'s AtomicBool,
 }
 
 impl<'s> Arranging<'_, 's> {
-    pub fn run(mut self) -> Result<Arrangement<'s>, Failure> {
+    fn run(mut self) -> Result<Arrangement<'s>, Failure> {
         let counts = self.log.counts();
         // Leaves below each vertex, then their places: one array for both.
         let mut leaves = vec![1_u32; counts.vertices as usize];
@@ -301,9 +317,4 @@ impl Storing {
         let count = brought.len() as u32;
         self.nodes.push([first, pivot, end, n, x, y, z, radius, eps, parent, start, count])
     }
-}
-
-/// A temporary file has fewer records than were written.
-fn too_few() -> io::Error {
-    io::ErrorKind::UnexpectedEof.into()
 }

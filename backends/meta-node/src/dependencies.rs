@@ -29,7 +29,8 @@
 //! every page that comes takes a chain further, and nothing takes it back.
 
 use rustc_hash::{FxHashMap, FxHashSet};
-use vertex_tree::{NONE, NodeId, StarMesh, Step, VertexId};
+use star_mesh::StarMesh;
+use vertex_tree::{NONE, NodeId, Step, VertexId};
 
 /// What is done about neighbours that are too coarse or too fine for a change.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]

@@ -2,9 +2,9 @@
 
 use std::sync::Arc;
 
-use vertex_tree::sections::Sections;
+use container::{Georeference, Sections};
 use vertex_tree::source::PageSource;
-use vertex_tree::{Bounds, Georeference, NodeId};
+use vertex_tree::{Bounds, NodeId};
 
 use crate::error::MetaNodeError;
 use crate::format::{Header, ROOT_WORDS, Root, TRIANGLE_WORDS, VERTEX_WORDS};

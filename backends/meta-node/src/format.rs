@@ -20,7 +20,7 @@
 //!     64      8  bytes of all pages
 //!     72      4  0
 //!     76      4  CRC-32 of bytes 0 to 75
-//!     80         table of sections, see `vertex_tree::sections`:
+//!     80         table of sections, see `container`:
 //!                GEOR  where the mesh lies in the world, if that is to be said
 //!                ROOT  28 R, roots: number, number in the log, centre, radius, error
 //!                BASV  16 W, vertices of the base mesh: leaf, place
@@ -34,6 +34,7 @@
 //!
 //! The lengths of the tables and of the file follow from the header and are checked before anything is allocated.
 
+use container::FileError;
 use vertex_tree::source::PageSource;
 use vertex_tree::{Bounds, NodeId};
 
@@ -139,24 +140,24 @@ impl Header {
             let start = &mut bytes[..actual.min(8) as usize];
             read(0, start)?;
             return Err(if *start == MAGIC {
-                MetaNodeError::Length { file: file(), expected: HEADER_BYTES, actual }
+                FileError::Length { file: file(), expected: HEADER_BYTES, actual }.into()
             } else {
-                MetaNodeError::Foreign { file: file() }
+                foreign(file())
             });
         }
         read(0, &mut bytes)?;
         let word = |at: usize| u32::from_le_bytes([bytes[at], bytes[at + 1], bytes[at + 2], bytes[at + 3]]);
         if bytes[..8] != MAGIC {
-            return Err(MetaNodeError::Foreign { file: file() });
+            return Err(foreign(file()));
         }
         if !(1..=VERSION).contains(&word(8)) {
-            return Err(MetaNodeError::Version { file: file(), version: word(8), expected: VERSION });
+            return Err(FileError::Version { file: file(), version: word(8), expected: "1 to 2" }.into());
         }
         if crc32fast::hash(&bytes[..76]) != word(76) {
-            return Err(MetaNodeError::Checksum { file: file(), offset: 0, section: "header" });
+            return Err(FileError::Checksum { file: file(), offset: 0, section: "header" }.into());
         }
         if word(12) != 0 {
-            return Err(MetaNodeError::Attributes { file: file(), stride: word(12) });
+            return Err(FileError::Attributes { file: file(), stride: word(12) }.into());
         }
         let header = Self {
             version: word(8),
@@ -233,6 +234,10 @@ impl Header {
         }
         Ok(())
     }
+}
+
+fn foreign(file: String) -> MetaNodeError {
+    FileError::Foreign { file, what: "no file of meta-nodes", magic: "FFMETAND" }.into()
 }
 
 /// A root, as it is known without its page.

@@ -8,7 +8,9 @@
 //! ```no_run
 //! # use std::{path::Path, sync::Arc};
 //! # use meta_node::{BuildOptions, MetaNodeFile, MetaNodeTree, Settings};
-//! # use vertex_tree::{CollapseLog, NullSink, Hierarchy, VertexTree, source::FileSource};
+//! # use collapse_log::CollapseLog;
+//! # use vertex_tree::source::FileSource;
+//! # use vertex_tree::{NullSink, Hierarchy, VertexTree};
 //! # fn main() -> Result<(), Box<dyn std::error::Error>> {
 //! # let log = CollapseLog::default();
 //! let path = Path::new("dragon.fold");
@@ -45,11 +47,12 @@ mod verify;
 mod waiting;
 mod write;
 
+pub use collapse_log::external::{Workspace, WorkspaceError};
+pub use container::FileError;
 pub use dependencies::Dependencies;
 pub use error::MetaNodeError;
 pub use file::MetaNodeFile;
 pub use format::MAGIC;
 pub use settings::{InUse, Io, Settings};
 pub use tree::MetaNodeTree;
-pub use vertex_tree::external::Workspace;
 pub use write::{BuildOptions, WriteReport, write, write_within};

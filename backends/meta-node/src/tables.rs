@@ -1,7 +1,6 @@
 //! Where the parts of a file are, and what is read of them at once: all but the pages.
 
-use vertex_tree::Georeference;
-use vertex_tree::sections::{BY_PAGE, Kind, SectionError, Sections};
+use container::{BY_PAGE, FileError, Georeference, Kind, SectionError, Sections};
 use vertex_tree::source::PageSource;
 
 use crate::error::MetaNodeError;
@@ -54,7 +53,7 @@ impl Tables {
         let expected = u128::from(pages_at) + u128::from(header.page_bytes);
         if expected != u128::from(actual) {
             let expected = u64::try_from(expected).unwrap_or(u64::MAX);
-            return Err(MetaNodeError::Length { file: file(), expected, actual });
+            return Err(FileError::Length { file: file(), expected, actual }.into());
         }
         let mut bytes = vec![0; length as usize];
         let offset = HEADER_BYTES;
@@ -65,7 +64,7 @@ impl Tables {
             source,
         })?;
         if crc32fast::hash(&bytes) != header.tables_checksum {
-            return Err(MetaNodeError::Checksum { file: file(), offset, section: "tables" });
+            return Err(FileError::Checksum { file: file(), offset, section: "tables" }.into());
         }
         let mut next = HEADER_BYTES;
         let at = counts.map(|count| {

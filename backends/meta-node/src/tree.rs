@@ -5,9 +5,8 @@ use std::ops::Range;
 use std::sync::Arc;
 use std::time::Duration;
 
-use vertex_tree::{
-    Bounds, Hierarchy, LeafTriangle, MeshSink, NodeId, PageStats, StarMesh, Step, TreeError, VertexTree,
-};
+use star_mesh::{LeafTriangle, StarMesh};
+use vertex_tree::{Bounds, MeshSink, NodeId, PageStats, Step, TreeError, Hierarchy, VertexTree};
 
 use crate::dependencies::{Half, Rules};
 use crate::error::MetaNodeError;

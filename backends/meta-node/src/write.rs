@@ -5,11 +5,13 @@ use std::io::{self, Write};
 use std::path::Path;
 use std::sync::atomic::{AtomicBool, Ordering};
 
-use vertex_tree::external::Workspace;
-use vertex_tree::sections::{BY_PAGE, Kind, SectionWriter};
-use vertex_tree::{CollapseLog, Georeference, LogSource, NONE, output};
+use collapse_log::external::{Workspace, WorkspaceError};
+use collapse_log::{CollapseLog, LogSource};
+use container::{BY_PAGE, Georeference, Kind, SectionWriter, output};
+use vertex_tree::NONE;
 
 use crate::arrange::{Arrangement, Node};
+use crate::arranging::arrange;
 use crate::blocking::{self, Blocking};
 use crate::error::MetaNodeError;
 use crate::format::{HEADER_BYTES, Header};
@@ -62,7 +64,7 @@ pub fn write(path: &Path, log: &CollapseLog, options: &BuildOptions) -> Result<W
 ///
 /// # Errors
 /// [`MetaNodeError::Log`], [`MetaNodeError::Levels`], [`MetaNodeError::TooLarge`], [`MetaNodeError::Io`],
-/// [`MetaNodeError::Temporary`], [`MetaNodeError::Interrupted`].
+/// [`MetaNodeError::Workspace`].
 pub fn write_within(
     path: &Path,
     log: &dyn LogSource,
@@ -72,7 +74,7 @@ pub fn write_within(
     if let Some(levels) = options.levels.filter(|levels| !(1..=page::MOST_LEVELS).contains(levels)) {
         return Err(MetaNodeError::Levels { levels, most: page::MOST_LEVELS });
     }
-    let arrangement = Arrangement::new(log, workspace)?;
+    let arrangement = arrange(log, workspace)?;
     let levels = options.levels.unwrap_or_else(|| blocking::levels_for(&arrangement, options.page_bytes));
     let blocking = Blocking::new(&arrangement, levels, options.page_bytes);
     let (pages, slots) = (blocking.pages.len() as u64, 1 << blocking.slot_bits);
@@ -86,7 +88,7 @@ pub fn write_within(
         arrangement.check()
     })
     .map_err(|source| match source {
-        _ if workspace.stop.load(Ordering::Relaxed) => MetaNodeError::Interrupted,
+        _ if workspace.stop.load(Ordering::Relaxed) => WorkspaceError::Interrupted.into(),
         source => MetaNodeError::Io { file: path.display().to_string(), offset: 0, length: 0, source },
     })?;
     Ok(WriteReport {

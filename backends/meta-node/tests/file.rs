@@ -4,10 +4,11 @@ mod common;
 
 use std::sync::Arc;
 
+use collapse_log::{Collapse, CollapseLog};
 use common::{bytes, open, random_log};
-use meta_node::{BuildOptions, MAGIC, MetaNodeError, MetaNodeFile};
+use meta_node::{BuildOptions, FileError, MAGIC, MetaNodeError, MetaNodeFile};
+use vertex_tree::Bounds;
 use vertex_tree::source::MemorySource;
-use vertex_tree::{Bounds, Collapse, CollapseLog};
 
 fn options(levels: u32, page_bytes: u32) -> BuildOptions {
     BuildOptions { levels: Some(levels), page_bytes }
@@ -128,7 +129,7 @@ fn every_truncated_file_is_refused() {
     }
     let mut longer = intact;
     longer.push(0);
-    assert!(matches!(open(longer), Err(MetaNodeError::Length { .. })));
+    assert!(matches!(open(longer), Err(MetaNodeError::File(FileError::Length { .. }))));
 }
 
 /// Words that lie, with checksums that agree with them: nothing panics, hangs or takes memory without end.

@@ -5,9 +5,9 @@ mod common;
 use std::path::Path;
 use std::sync::atomic::AtomicBool;
 
+use collapse_log::{CollapseLog, LogError, LogFile, LogSource, write_log};
 use common::{bytes, open, random_log};
-use meta_node::{BuildOptions, MetaNodeError, Workspace, write_within};
-use vertex_tree::{CollapseLog, LogError, LogFile, LogSource, write_log};
+use meta_node::{BuildOptions, MetaNodeError, Workspace, WorkspaceError, write_within};
 
 static RUNNING: AtomicBool = AtomicBool::new(false);
 
@@ -68,7 +68,7 @@ fn wrong_logs_are_refused() {
     assert_eq!(error, LogError::CornerOutOfRange { triangle: 7, vertex: 100, vertices: 100 });
     let nowhere = Workspace { folder: folder.path().join("nowhere"), memory: 0, stop: &RUNNING };
     let error = write_within(&folder.path().join("tree"), &right, &BuildOptions::default(), &nowhere);
-    assert!(matches!(error, Err(MetaNodeError::Temporary { .. })), "{error:?}");
+    assert!(matches!(error, Err(MetaNodeError::Workspace(WorkspaceError::Temporary { .. }))), "{error:?}");
 }
 
 #[test]
@@ -77,6 +77,6 @@ fn it_stops_when_it_is_told_to() {
     let workspace = Workspace { folder: folder.path().to_owned(), memory: 0, stop: &AtomicBool::new(true) };
     let file = folder.path().join("tree");
     let outcome = write_within(&file, &random_log(10, 1, 1), &BuildOptions::default(), &workspace);
-    assert!(matches!(outcome, Err(MetaNodeError::Interrupted)), "{outcome:?}");
+    assert!(matches!(outcome, Err(MetaNodeError::Workspace(WorkspaceError::Interrupted))), "{outcome:?}");
     assert_eq!(std::fs::read_dir(folder.path()).unwrap().count(), 0);
 }

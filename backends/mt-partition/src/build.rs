@@ -7,98 +7,44 @@
 //! |---|---|
 //! | `history` | puts the collapses in order along a curve through space, and finds what becomes of each vertex |
 //! | `versions` | follows each triangle of the input through the collapses that change it; arcs are counted |
-//! | `rounds`, `region` | the reduction, in regions of the curve that fit in memory |
+//! | `rounds`, `region`, `arcs` | the reduction, in regions of the curve that fit in memory |
 //! | `arranging` | nested bounds, layers, partitions and numbers |
 //! | `writing` | follows the triangles once more, sorts them by the arcs that they lie on, and writes |
 //!
 //! Until nodes have their numbers in the file a node is known by its *place*, the number of its collapse along the curve:
 //! what is near each other is then mostly on the same page of an array.
 
+mod arcs;
 mod arranging;
 mod history;
 mod region;
 #[cfg(test)]
 mod replay;
+mod report;
 mod rounds;
 mod versions;
+mod work;
 mod writing;
 
 use std::io;
 use std::path::Path;
 use std::sync::atomic::{AtomicBool, Ordering};
 
-use vertex_tree::external::{Scratch, Workspace, check_stop};
-use vertex_tree::{CollapseLog, LogCounts, LogError, LogSource, NONE, output};
+use collapse_log::external::{Scratch, Workspace};
+use collapse_log::{CollapseLog, LogCounts, LogSource};
+use container::output;
+use vertex_tree::NONE;
 
-use crate::{BuildOptions, MtError};
+pub use self::report::WriteReport;
+use super::error::MtError;
+use crate::options::BuildOptions;
 use arranging::Arranged;
 use history::History;
 use rounds::Rounds;
-
-/// What was written.
-#[derive(Clone, Copy, Debug, Default, PartialEq)]
-#[non_exhaustive]
-pub struct WriteReport {
-    /// Triangles of the input.
-    pub triangles: u64,
-    /// Nodes of the reduced graph.
-    pub nodes: u64,
-    /// Partitions of nodes.
-    pub partitions: u64,
-    /// Triangles on the arcs, those of the input included.
-    pub stored_triangles: u64,
-    /// Arcs, those of the source and the drain included.
-    pub arcs: u64,
-    /// Triangles on arcs, and arcs, before the reduction.
-    pub unreduced: (u64, u64),
-    /// Arc collapses that were given up because of a second path between the nodes.
-    pub refused: u64,
-    /// By how much the radius of a node exceeds the largest of its collapses', mean and maximum.
-    pub inflation: [f64; 2],
-    /// Bytes of the file.
-    pub bytes: u64,
-}
+use work::{Failure, Work};
 
 /// Less memory than this is taken for so much.
 pub const LEAST_MEMORY: u64 = 1 << 16;
-
-/// What can go wrong.
-enum Failure {
-    Log(LogError),
-    /// With a temporary file, unless somebody wanted it to end.
-    Temporary(io::Error),
-    /// With the file that is being written.
-    Output(io::Error),
-}
-
-impl From<io::Error> for Failure {
-    fn from(error: io::Error) -> Self {
-        Self::Temporary(error)
-    }
-}
-
-impl From<LogError> for Failure {
-    fn from(error: LogError) -> Self {
-        Self::Log(error)
-    }
-}
-
-/// What all stages need.
-#[derive(Clone, Copy)]
-struct Work<'a> {
-    log: &'a dyn LogSource,
-    scratch: &'a Scratch,
-    /// Bytes that everything may take together.
-    memory: usize,
-    stop: &'a AtomicBool,
-}
-
-impl Work<'_> {
-    /// Fails if somebody wants it to end.
-    fn check(&self) -> io::Result<()> {
-        check_stop(self.stop)
-    }
-}
 
 /// Arranges a log that is in memory as a reduced, partitioned multi-triangulation and writes it to a file, whole or not at
 /// all. Temporary files are made beside `path`, and as much memory is taken as serves: about 200 bytes for each triangle.
@@ -115,8 +61,8 @@ pub fn write(path: &Path, log: &CollapseLog, options: &BuildOptions) -> Result<W
 /// it has to for whoever opens the file.
 ///
 /// # Errors
-/// [`MtError::Log`] if the log does not fit its mesh, [`MtError::TooLarge`], [`MtError::Io`], [`MtError::Temporary`] and
-/// [`MtError::Interrupted`].
+/// [`MtError::Log`] if the log does not fit its mesh, [`MtError::TooLarge`], [`MtError::Io`] and
+/// [`MtError::Workspace`].
 pub fn write_within(
     path: &Path,
     log: &dyn LogSource,
@@ -131,9 +77,8 @@ pub fn write_within(
     let io = |source| MtError::Io { file: path.display().to_string(), offset: 0, length: 0, source };
     let name = |failure| match failure {
         Failure::Log(error) => error.into(),
-        _ if workspace.stop.load(Ordering::Relaxed) => MtError::Interrupted,
-        Failure::Temporary(source) => MtError::Temporary { folder: workspace.folder.clone(), source },
-        Failure::Output(source) => io(source),
+        Failure::Output(source) if !workspace.stop.load(Ordering::Relaxed) => io(source),
+        Failure::Output(source) | Failure::Temporary(source) => workspace.error(source).into(),
     };
     let arranged = arrange(work, options).map_err(name)?;
     // Errors of the closure are those of the operating system alone: ours are kept beside it.
@@ -166,9 +111,4 @@ fn arrange(work: Work<'_>, options: &BuildOptions) -> Result<Arranged, Failure> 
     let mut rounds = Rounds::new(work, history, arcs)?;
     rounds.run(options.patch)?;
     Arranged::new(work, options, fates, rounds)
-}
-
-/// A temporary file has fewer records than were written.
-fn too_few() -> io::Error {
-    io::ErrorKind::UnexpectedEof.into()
 }

@@ -2,11 +2,11 @@
 
 use std::sync::Arc;
 
-use vertex_tree::sections::Sections;
+use container::{Georeference, Sections};
 use vertex_tree::source::PageSource;
-use vertex_tree::{Bounds, Georeference, NONE, NodeId};
+use vertex_tree::{Bounds, NONE, NodeId};
 
-use crate::MtError;
+use super::error::MtError;
 use crate::format::{Header, NODE, PARTITION, ROOT};
 use crate::opening::{Opener, words};
 use crate::record::{Limits, Record};

@@ -25,7 +25,7 @@
 //!    148      4  order of the partitioning queue: 0 increasing, 1 decreasing
 //!    152      4  CRC-32 of bytes 0 to 151
 //!    156      4  zeros
-//!    160         table of sections, see `vertex_tree::sections`:
+//!    160         table of sections, see `container`:
 //!                GEOR  where the mesh lies in the world, if that is to be said
 //!                ROOT  24 R, roots, in ascending order: node u32, centre 3 f32, radius f32, eps f32
 //!                PART  4 P, partitions: first node u32; a partition ends where the next one starts

@@ -4,7 +4,8 @@
 //! ```
 //! # use std::sync::Arc;
 //! # use vertex_tree::source::FileSource;
-//! # use vertex_tree::{CollapseLog, NullSink, Hierarchy, VertexTree};
+//! # use collapse_log::CollapseLog;
+//! # use vertex_tree::{NullSink, Hierarchy, VertexTree};
 //! # use mt_partition::{BuildOptions, MtFile, MtTree, Settings, write};
 //! # fn main() -> Result<(), Box<dyn std::error::Error>> {
 //! # let folder = tempfile::tempdir()?;
@@ -38,6 +39,7 @@ mod format;
 mod graph;
 mod memory;
 mod opening;
+mod options;
 mod order;
 mod paging;
 mod partition;
@@ -51,29 +53,13 @@ mod verify;
 
 pub use build::{LEAST_MEMORY, WriteReport, write, write_within};
 pub use cache::CacheMode;
+pub use collapse_log::external::{Workspace, WorkspaceError};
+pub use container::FileError;
 pub use error::MtError;
 pub use file::{MtFile, StoredNode};
 pub use format::MAGIC;
 pub use memory::Memory;
+pub use options::BuildOptions;
 pub use partition::QueueOrder;
 pub use reader::Reader;
 pub use tree::{MtTree, Settings};
-pub use vertex_tree::external::Workspace;
-
-/// How to build a file.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct BuildOptions {
-    /// Nodes are merged until arcs hold so many triangles on average; 0 leaves the graph as it is.
-    pub patch: f64,
-    /// Nodes in a partition, at most. The paper advises 20 for one object, 50 to 100 for many.
-    pub partition: u32,
-    /// In which order partitions are merged.
-    pub order: QueueOrder,
-}
-
-impl Default for BuildOptions {
-    /// Patches of 10 triangles, partitions of 20 nodes.
-    fn default() -> Self {
-        Self { patch: 10.0, partition: 20, order: QueueOrder::default() }
-    }
-}

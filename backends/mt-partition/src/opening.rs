@@ -1,10 +1,10 @@
 //! Reading header, tables and base mesh, of all versions.
 
-use vertex_tree::sections::{BY_PAGE, Kind, SectionError, Sections};
+use container::{BY_PAGE, FileError, Georeference, Kind, SectionError, Sections};
+use vertex_tree::NONE;
 use vertex_tree::source::PageSource;
-use vertex_tree::{Georeference, NONE};
 
-use crate::MtError;
+use super::error::MtError;
 use crate::format::{CHECKSUM, HEADER, Header, MAGIC, VERSION};
 
 /// Reads while there is no file yet, and makes errors.
@@ -23,7 +23,7 @@ impl Opener<'_> {
 
     pub fn record(&self, offset: u64, (what, value): (&'static str, u64)) -> MtError {
         if what == "checksum" {
-            return MtError::Checksum { file: self.file(), offset, section: "node" };
+            return FileError::Checksum { file: self.file(), offset, section: "node" }.into();
         }
         self.range(offset, what, value)
     }
@@ -43,20 +43,21 @@ impl Opener<'_> {
         let known = actual.min(HEADER as u64) as usize;
         bytes[..known].copy_from_slice(&self.read(0, known as u64)?);
         if bytes[..8] != MAGIC {
-            return Err(MtError::NotThis { file: self.file() });
+            let what = "not a partitioned multi-triangulation";
+            return Err(FileError::Foreign { file: self.file(), what, magic: "FFMTPART" }.into());
         }
         if known < HEADER {
-            return Err(MtError::Length { file: self.file(), expected: HEADER as u64, actual });
+            return Err(FileError::Length { file: self.file(), expected: HEADER as u64, actual }.into());
         }
         let [version, stride] = words(&bytes[8..16]);
         if !(1..=VERSION).contains(&version) {
-            return Err(MtError::Version { file: self.file(), version });
+            return Err(FileError::Version { file: self.file(), version, expected: "1 or 2" }.into());
         }
         if stride != 0 {
-            return Err(MtError::Attributes { file: self.file(), stride });
+            return Err(FileError::Attributes { file: self.file(), stride }.into());
         }
         if words(&bytes[HEADER - 4..]) != [crc32fast::hash(&bytes[..HEADER - 4])] {
-            return Err(MtError::Checksum { file: self.file(), offset: 0, section: "header" });
+            return Err(FileError::Checksum { file: self.file(), offset: 0, section: "header" }.into());
         }
         let header = Header::decode(&bytes);
         let most = u64::from(NONE) - 1;
@@ -109,7 +110,7 @@ impl Opener<'_> {
         let base_at = HEADER as u64 + lengths.iter().map(|length| length + CHECKSUM).sum::<u64>();
         let (least, actual) = (base_at.saturating_add(header.source_bytes), self.source.len());
         if actual < least {
-            return Err(MtError::Length { file: self.file(), expected: least, actual });
+            return Err(FileError::Length { file: self.file(), expected: least, actual }.into());
         }
         let mut at = HEADER as u64;
         let mut all = [const { (0, Vec::new()) }; 3];
@@ -117,7 +118,7 @@ impl Opener<'_> {
             let mut bytes = self.read(at, length + CHECKSUM)?;
             let checksum = bytes.split_off(length as usize);
             if words(&checksum) != [crc32fast::hash(&bytes)] {
-                return Err(MtError::Checksum { file: self.file(), offset: at, section });
+                return Err(FileError::Checksum { file: self.file(), offset: at, section }.into());
             }
             *place = (at, bytes);
             at += length + CHECKSUM;
@@ -133,7 +134,7 @@ impl Opener<'_> {
         let Some(sections) = &tables.sections else {
             let (expected, actual) = (tables.records_at + length, self.source.len());
             if expected != actual {
-                return Err(MtError::Length { file: self.file(), expected, actual });
+                return Err(FileError::Length { file: self.file(), expected, actual }.into());
             }
             return Ok(());
         };

@@ -21,7 +21,7 @@ use std::time::{Duration, Instant};
 use crossbeam_channel::{Receiver, Sender, unbounded};
 use vertex_tree::simulated::{self, Reads, Simulated};
 
-use crate::MtError;
+use super::error::MtError;
 use crate::file::MtFile;
 use crate::record::Record;
 

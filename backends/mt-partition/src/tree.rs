@@ -6,7 +6,7 @@ use vertex_tree::{
     Bounds, Hierarchy, MeshSink, NONE, NodeId, PageStats, Prefetch, Step, TreeError, VertexId, VertexTree,
 };
 
-use crate::MtError;
+use super::error::MtError;
 use crate::cache::CacheMode;
 use crate::display::Display;
 use crate::file::MtFile;

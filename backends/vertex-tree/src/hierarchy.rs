@@ -6,7 +6,9 @@
 
 use std::time::Duration;
 
-use crate::{Bounds, NormalCone, PageStats, TreeError};
+use crate::bounds::{Bounds, NormalCone};
+use crate::error::TreeError;
+use crate::paging::PageStats;
 
 /// Number of an inner node in a backend's own numbering, less than [`Hierarchy::node_limit`].
 ///

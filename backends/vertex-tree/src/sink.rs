@@ -4,6 +4,9 @@
 /// again, so a sink can index arrays by them that are no longer than the displayed mesh once was.
 pub type VertexId = u32;
 
+/// Stands for "no node", "no vertex" and "no triangle" in arrays of their numbers.
+pub const NONE: u32 = u32::MAX;
+
 /// Slot of a displayed triangle, likewise. A backend may move a triangle to another slot: it disappears and appears.
 pub type TriangleId = u32;
 

@@ -1,6 +1,8 @@
 //! The trait between the engine and the storage backends of meshes.
 
-use crate::{Hierarchy, MeshSink, NodeId, Refine, Step, TreeError};
+use crate::error::TreeError;
+use crate::hierarchy::{Hierarchy, NodeId, Refine, Step};
+use crate::sink::MeshSink;
 
 /// A forest of vertex merges (or a directed acyclic graph of them) that can be unfolded and folded node by node: a
 /// [`Hierarchy`] that displays a mesh, in whatever [`MeshSink`].

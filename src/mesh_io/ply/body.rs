@@ -4,10 +4,10 @@ use std::io::{self, BufRead, Read};
 
 use serde_ply::{PlyFormat, ScalarType};
 
+use crate::mesh_io::error::{MeshIoError, Place};
 use crate::mesh_io::input::Input;
 use crate::mesh_io::text::malformed;
 use crate::mesh_io::words::Words;
-use crate::mesh_io::{MeshIoError, Place};
 
 /// Reads scalars one after the other. In text each is a word, on whatever line.
 pub(super) enum Body<'i, 'a> {

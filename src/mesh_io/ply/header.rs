@@ -4,8 +4,8 @@ use std::io::{self, BufRead, Read};
 
 use serde_ply::{PlyHeader, PlyReader};
 
+use crate::mesh_io::error::{MeshIoError, Place};
 use crate::mesh_io::input::{Input, read_error};
-use crate::mesh_io::{MeshIoError, Place};
 
 /// Reads the header, and says how many lines it has. The library that takes it apart wants UTF-8, though comments come in any
 /// encoding, and lines that end with a line feed.

@@ -2,7 +2,7 @@
 
 use std::path::Path as FilePath;
 
-use super::{ImportError, Warning};
+use super::error::{ImportError, Warning};
 use crate::path::PathError;
 use crate::path::format::Line;
 

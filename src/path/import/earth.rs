@@ -2,10 +2,10 @@
 
 use std::f64::consts::PI;
 
+use container::DegreeMap;
 use glam::DVec3;
-use vertex_tree::DegreeMap;
 
-use super::ImportError;
+use super::error::ImportError;
 use crate::path::format::Line;
 
 /// Metres of the radius of a sphere with the earth's volume.

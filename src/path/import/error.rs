@@ -5,7 +5,8 @@ use std::path::PathBuf;
 use glam::DVec3;
 use thiserror::Error;
 
-use super::{MAX_FRAMES, MAX_RATE, PathError};
+use super::options::{MAX_FRAMES, MAX_RATE};
+use crate::path::error::PathError;
 use crate::view::ViewError;
 
 /// Why a trajectory could not be imported. Lines count from 1.

@@ -2,9 +2,9 @@
 
 use std::path::Path as FilePath;
 
+use super::error::{ImportError, Warning};
 use super::fields::{Separator, filled};
 use super::names::{Name, Role, words};
-use super::{ImportError, Warning};
 
 /// A column that is read, and what turns it into metres or degrees.
 #[derive(Clone, Copy, Debug, PartialEq)]

@@ -5,8 +5,8 @@ use std::path::Path as FilePath;
 use glam::DVec3;
 
 use super::axes::look;
+use super::error::{ImportError, Warning};
 use super::trajectory::{Sample, Trajectory};
-use super::{ImportError, Warning};
 use crate::path::format::Line;
 
 /// There are no time stamps.

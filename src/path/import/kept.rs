@@ -1,7 +1,7 @@
 //! A resampled trajectory where it was recorded.
 
+use collapse_log::Mesh;
 use glam::{DQuat, DVec3};
-use vertex_tree::Mesh;
 
 use super::placement::{ahead, frames};
 use super::trajectory::Sample;

@@ -2,13 +2,13 @@
 
 use std::f64::consts::PI;
 
+use collapse_log::Mesh;
 use glam::{DQuat, DVec2, DVec3};
-use vertex_tree::Mesh;
 
 use super::axes::{QUARTER, look};
 use super::envelope::Envelope;
+use super::options::{Mode, Up};
 use super::trajectory::Sample;
-use super::{Mode, Up};
 use crate::path::Pose;
 
 /// A mesh flatter than this part of its shorter side is terrain, and has z up if it is flat in z.

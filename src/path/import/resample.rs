@@ -4,8 +4,9 @@ use std::path::Path as FilePath;
 
 use glam::{DQuat, DVec3};
 
+use super::error::ImportError;
+use super::options::MAX_FRAMES;
 use super::trajectory::Sample;
-use super::{ImportError, MAX_FRAMES};
 
 /// Seconds between samples from which they have a gap between them, if also so many times the median.
 const GAP: f64 = 0.5;

@@ -6,10 +6,10 @@ use std::path::Path as FilePath;
 use super::axes::{camera_in_body, upright};
 use super::clock::Clock;
 use super::earth::Plane;
+use super::error::{ImportError, Warning};
 use super::fields::{Separator, filled};
 use super::header::{self, Layout};
 use super::trajectory::{Place, Sample, Trajectory};
-use super::{ImportError, Warning};
 use crate::path::format::Line;
 
 /// Reads `rows`, of which there is one at least: numbers, and maybe their names in front.

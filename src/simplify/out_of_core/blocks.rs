@@ -24,6 +24,20 @@ pub(super) const TRIANGLE_WORDS: usize = 6;
 pub(super) const NODE_WORDS: usize = 9;
 pub(super) const POINT_WORDS: usize = 5;
 
+/// How near a block is to those whose vertices come up.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, PartialOrd, Ord)]
+pub(super) enum Ring {
+    /// Not in the window.
+    #[default]
+    Outside,
+    /// Shares triangles with those that are near: the stars of their vertices are complete.
+    Far,
+    /// Shares triangles with those whose vertices come up.
+    Near,
+    /// Its vertices come up.
+    Inner,
+}
+
 /// How many there are of everything.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub(super) struct Counts {

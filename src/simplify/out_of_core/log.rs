@@ -3,9 +3,9 @@
 use std::io;
 use std::ops::Range;
 
-use vertex_tree::external::{Scratch, Sorter, Spool};
+use collapse_log::external::{Scratch, Sorter, Spool};
 
-use super::super::Round;
+use super::super::report::Round;
 use super::super::rounds::Builder;
 
 /// The collapses in order, on disk.

@@ -3,16 +3,16 @@
 use std::collections::HashMap;
 use std::hash::BuildHasherDefault;
 
+use collapse_log::Collapse;
 use glam::Vec3;
 use rustc_hash::FxHasher;
-use vertex_tree::{Bounds, Collapse, NONE};
+use vertex_tree::{Bounds, NONE};
 
 use super::super::candidates::{Parity, State};
 use super::super::nodes::Nodes;
 use super::super::quadric::Quadric;
 use super::super::surface::Triangle;
-use super::blocks::{Blocks, Counts, NODE_WORDS, POINT_WORDS, TRIANGLE_WORDS, VERTEX_WORDS};
-use super::window::Ring;
+use super::blocks::{Blocks, Counts, NODE_WORDS, POINT_WORDS, Ring, TRIANGLE_WORDS, VERTEX_WORDS};
 
 type FastMap = HashMap<u32, u32, BuildHasherDefault<FxHasher>>;
 

@@ -9,20 +9,20 @@ use std::io;
 use std::ops::Range;
 use std::sync::atomic::{AtomicBool, Ordering};
 
+use collapse_log::external::Sorter;
 use parking_lot::Mutex;
 use rustc_hash::FxHashSet;
 use vertex_tree::NONE;
-use vertex_tree::external::Sorter;
 
+use super::super::initial::{initial_quadric, leaf_radius};
 use super::super::key_counts::KeyCounts;
 use super::super::order::PIECES;
 use super::super::remains::Remains;
 use super::super::rounds::Builder;
-use super::super::{initial_quadric, leaf_radius};
-use super::blocks::Blocks;
+use super::blocks::{Blocks, Ring};
 use super::log::Log;
-use super::passes::check;
-use super::window::{Ring, Whole, Window};
+use super::stop::check;
+use super::window::{Whole, Window};
 
 /// What is done to the vertices of a window.
 #[derive(Clone, Copy, Debug)]

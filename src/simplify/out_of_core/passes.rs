@@ -3,19 +3,20 @@
 use std::io;
 use std::sync::atomic::{AtomicBool, Ordering};
 
+use collapse_log::external::{Scratch, Sorter};
 use parking_lot::Mutex;
 use vertex_tree::NONE;
-use vertex_tree::external::{Scratch, Sorter};
 
 use super::super::candidates::Parity;
 use super::super::key_counts::KeyCounts;
 use super::super::order::{self, PARTS, PIECES};
 use super::super::remains::Remains;
 use super::super::stall::Stall;
-use super::blocks::Blocks;
+use super::blocks::{Blocks, Ring};
 use super::log::Log;
 use super::pass::{Pass, Totals, Work};
-use super::window::{Ring, Whole, Window};
+use super::stop::check;
+use super::window::{Whole, Window};
 
 /// The construction between passes.
 #[derive(Debug)]
@@ -235,16 +236,6 @@ impl Passes<'_> {
         (parts, borders)
     }
 }
-
-/// Fails if somebody wants the construction to stop.
-pub(super) fn check(stop: &AtomicBool) -> io::Result<()> {
-    if stop.load(Ordering::Relaxed) { Err(io::Error::other(Interrupted)) } else { Ok(()) }
-}
-
-/// Somebody wanted the construction to stop.
-#[derive(Debug, thiserror::Error)]
-#[error("interrupted")]
-pub(super) struct Interrupted;
 
 /// The parity of the first round.
 pub(super) const FIRST_PARITY: Parity = Parity::Even;

@@ -5,11 +5,12 @@
 
 use std::io;
 
+use collapse_log::external::{Scratch, Sorter, Spool};
+use container::{Georeference, Rounding};
 use glam::Vec3;
-use vertex_tree::external::{Scratch, Sorter, Spool};
-use vertex_tree::{Georeference, NONE, Rounding};
+use vertex_tree::NONE;
 
-use super::super::is_flat;
+use super::super::initial::is_flat;
 use super::super::spatial_order::Curve;
 use super::blocks::{Blocks, VERTEX_WORDS, Words};
 use crate::edge_lengths::EdgeLengths;

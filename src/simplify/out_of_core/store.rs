@@ -9,8 +9,8 @@ use super::super::candidates::{Parity, State};
 use super::super::marks::Marks;
 use super::super::nodes::Nodes;
 use super::super::surface::{Surface, Triangle};
-use super::blocks::{Blocks, NODE_WORDS, VERTEX_WORDS, Words};
-use super::window::{Ring, Window};
+use super::blocks::{Blocks, NODE_WORDS, Ring, VERTEX_WORDS, Words};
+use super::window::Window;
 
 impl Window {
     /// Writes the blocks in which something has changed. `stays` says which of the vertices that are left are still of

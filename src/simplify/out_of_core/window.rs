@@ -16,22 +16,8 @@ use super::super::marks::Marks;
 use super::super::nodes::Nodes;
 use super::super::rounds::Builder;
 use super::super::surface::Surface;
-use super::blocks::{Blocks, Words};
+use super::blocks::{Blocks, Ring, Words};
 use super::parts::Parts;
-
-/// How near a block is to those whose vertices come up.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, PartialOrd, Ord)]
-pub(super) enum Ring {
-    /// Not in the window.
-    #[default]
-    Outside,
-    /// Shares triangles with those that are near: the stars of their vertices are complete.
-    Far,
-    /// Shares triangles with those whose vertices come up.
-    Near,
-    /// Its vertices come up.
-    Inner,
-}
 
 /// What does not change during a pass.
 #[derive(Clone, Debug)]

@@ -2,7 +2,7 @@
 
 use std::sync::Arc;
 
-use detail_block::{Arrangement, MAGIC, XfmError, XfmFile, XfmTree};
+use detail_block::{Arrangement, FileError, MAGIC, XfmError, XfmFile, XfmTree};
 use vertex_tree::source::MemorySource;
 use vertex_tree::{Hierarchy, MeshSink, NodeId, Step, TriangleId, VertexId, VertexTree};
 
@@ -28,7 +28,7 @@ fn every_truncated_file_is_an_error() {
         assert!(error.to_string().starts_with("bytes: "), "{error}");
     }
     let longer = [&bytes[..], &[0]].concat();
-    assert!(matches!(open(&longer), Err(XfmError::FileLength { .. })));
+    assert!(matches!(open(&longer), Err(XfmError::File(FileError::Length { .. }))));
 }
 
 #[test]
@@ -49,7 +49,7 @@ fn every_flipped_bit_is_found() {
 #[test]
 fn foreign_files_are_named() {
     for bytes in [&b""[..], b"FFXFMES", b"FFCOLLOG and so on", &[0; 4096]] {
-        assert!(matches!(open(bytes), Err(XfmError::NotXfm { .. })));
+        assert!(matches!(open(bytes), Err(XfmError::File(FileError::Foreign { .. }))));
     }
     let mut later = small_file(4, false);
     later[8] = 3;

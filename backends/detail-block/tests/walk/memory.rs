@@ -4,8 +4,11 @@ use std::io;
 use std::path::Path;
 use std::sync::atomic::AtomicBool;
 
-use detail_block::{Arrangement, BuildOptions, Workspace, XfmError, needed_bytes, write_within};
-use vertex_tree::{Collapse, CollapseLog, Georeference, LogCounts, LogSource, Mesh, Records};
+use collapse_log::{Collapse, CollapseLog, LogCounts, LogSource, Mesh, Records};
+use container::Georeference;
+use detail_block::{
+    Arrangement, BuildOptions, Workspace, WorkspaceError, XfmError, needed_bytes, write_within,
+};
 
 use crate::driver::bytes_of;
 use crate::meshes::{Random, grid, random_log, rubble, torus};
@@ -132,11 +135,14 @@ fn what_fails_is_named_and_leaves_nothing() {
     }
     let nowhere = Workspace { folder: folder.path().join("nowhere"), ..workspace.clone() };
     let error = write_within(&path, &log, &options, &nowhere).unwrap_err();
-    assert!(matches!(&error, XfmError::Temporary { folder, .. } if *folder == nowhere.folder), "{error}");
+    assert!(
+        matches!(&error, XfmError::Workspace(WorkspaceError::Temporary { folder, .. }) if *folder == nowhere.folder),
+        "{error}"
+    );
     assert!(error.to_string().contains("nowhere"));
     let interrupted = Workspace { stop: stopped, ..workspace.clone() };
     let outcome = write_within(&path, &log, &options, &interrupted);
-    assert!(matches!(outcome, Err(XfmError::Interrupted)), "{outcome:?}");
+    assert!(matches!(outcome, Err(XfmError::Workspace(WorkspaceError::Interrupted))), "{outcome:?}");
     let outcome = write_within(&nowhere.folder.join("file"), &log, &options, &workspace);
     assert!(matches!(outcome, Err(XfmError::Write { .. })), "{outcome:?}");
     let mut wrong = log.clone();

@@ -2,7 +2,8 @@
 
 #![expect(clippy::disallowed_methods, reason = "random shapes and motions, or figures to compare with")]
 
-use vertex_tree::{Bounds, Collapse, CollapseLog, Mesh};
+use collapse_log::{Collapse, CollapseLog, Mesh};
+use vertex_tree::Bounds;
 
 /// A small generator with a fixed sequence.
 #[derive(Clone)]

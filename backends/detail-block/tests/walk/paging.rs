@@ -3,10 +3,11 @@
 use std::sync::Arc;
 use std::time::Duration;
 
+use collapse_log::CollapseLog;
 use detail_block::{ATTEMPTS, Arrangement, BuildOptions, Io, Settings, XfmFile};
 use vertex_tree::simulated::Simulated;
 use vertex_tree::source::{Faults, Faulty, MemorySource};
-use vertex_tree::{CollapseLog, Hierarchy, NodeId};
+use vertex_tree::{NodeId, Hierarchy};
 
 use crate::driver::{Driver, bytes_of, open};
 use crate::meshes::{Random, random_log, torus};

@@ -4,9 +4,10 @@
 
 use std::sync::Arc;
 
+use collapse_log::{Collapse, CollapseLog, Mesh};
 use meta_node::{BuildOptions, MetaNodeError, MetaNodeFile, MetaNodeTree};
 use vertex_tree::source::MemorySource;
-use vertex_tree::{Bounds, Collapse, CollapseLog, Hierarchy, Mesh, NodeId, NullSink, Step, VertexTree};
+use vertex_tree::{Bounds, NodeId, NullSink, Step, Hierarchy, VertexTree};
 
 /// A small generator with a fixed sequence.
 pub struct Random(pub u64);

@@ -7,15 +7,16 @@
 
 use std::io;
 
-use vertex_tree::external::{Array, Paged, Sorter, Spool};
+use collapse_log::external::{Array, Paged, Sorter, Spool, too_few};
 use vertex_tree::{Bounds, NONE};
 
+use super::arcs::{ARC_BYTES, NODE_BYTES};
 use super::history::State;
-use super::rounds::{ARC_BYTES, NODE_BYTES, Rounds};
-use super::{Failure, Work, too_few};
-use crate::BuildOptions;
+use super::rounds::Rounds;
+use super::work::{Failure, Work};
 use crate::bounds::around;
 use crate::graph::Graph;
+use crate::options::BuildOptions;
 use crate::partition::partitions;
 
 /// The graph as it will be written.

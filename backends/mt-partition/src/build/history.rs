@@ -3,10 +3,11 @@
 use std::io;
 
 use bytemuck::{Pod, Zeroable};
-use vertex_tree::external::{Array, Sorter, Spool};
-use vertex_tree::{LogError, NONE, z_order};
+use collapse_log::external::{Array, Sorter, Spool};
+use collapse_log::{LogError, z_order};
+use vertex_tree::NONE;
 
-use super::{Failure, Work};
+use super::work::{Failure, Work};
 use crate::reduce::reach;
 
 /// What becomes of a vertex.

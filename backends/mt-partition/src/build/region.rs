@@ -2,15 +2,27 @@
 
 use std::io;
 
+use collapse_log::external::Array;
 use vertex_tree::NONE;
-use vertex_tree::external::Array;
 
-use super::Work;
 use super::history::State;
-use super::rounds::{ABOVE, BELOW, Outcome};
+use super::work::Work;
 use crate::graph::Graph;
 use crate::order::Order;
 use crate::reduce::Reduction;
+
+/// Says which ends of an arc are in a region.
+pub(super) const ABOVE: u32 = 1;
+pub(super) const BELOW: u32 = 2;
+
+/// What a round, or a region of it, has come to.
+#[derive(Clone, Copy, Debug, Default)]
+pub(super) struct Outcome {
+    pub merged: u64,
+    pub refused: u64,
+    /// The least key of a candidate that was above the limit.
+    pub left: Option<f64>,
+}
 
 /// Nodes of a region and their neighbours in others, in the order of their collapses.
 pub(super) struct Region {

@@ -3,12 +3,14 @@
 use std::collections::BTreeMap;
 use std::sync::atomic::AtomicBool;
 
+use collapse_log::external::Scratch;
+use collapse_log::{Collapse, CollapseLog, Mesh};
 use proptest::prelude::*;
-use vertex_tree::external::Scratch;
-use vertex_tree::{Bounds, Collapse, CollapseLog, Mesh, NONE};
+use vertex_tree::{Bounds, NONE};
 
 use super::history::History;
-use super::{LEAST_MEMORY, Work, versions};
+use super::work::Work;
+use super::{LEAST_MEMORY, versions};
 
 /// Triangles on each arc, given by the collapses above and below.
 fn replay(log: &CollapseLog) -> BTreeMap<[u32; 2], u32> {

@@ -16,103 +16,19 @@
 
 use std::io;
 
+use collapse_log::external::{Array, Sorter, Spool, too_few};
 use vertex_tree::NONE;
-use vertex_tree::external::{Array, Sorter, Spool};
 
+use super::arcs::{Arcs, Collecting};
 use super::history::{History, State};
-use super::region::Region;
-use super::{Work, too_few};
+use super::region::{ABOVE, BELOW, Outcome, Region};
+use super::work::Work;
 use crate::reduce::SIZE;
-
-/// Nodes along a curve that are counted together when the graph is cut into regions.
-const SPAN: u32 = 64;
-
-/// Bytes of memory that a node of a region takes, and an arc, once for each end in the region.
-pub(super) const NODE_BYTES: u64 = 220;
-pub(super) const ARC_BYTES: u64 = 60;
 
 /// Limit of the first round: nodes that hold so many triangles together may be merged.
 const FIRST_LIMIT: f64 = SIZE * 16.0;
 /// By how much the limit grows from round to round: see DESIGN.md for what others gave.
 const GROWTH: f64 = 1.25;
-
-/// The arcs of a graph in ascending order: node above, node below, triangles. Of those with the source above or the drain
-/// below [`NONE`] stands for the one.
-pub(super) struct Arcs {
-    pub spool: Spool<3>,
-    /// Arcs, and the triangles on them.
-    pub totals: (u64, u64),
-    /// Bytes of memory for each [`SPAN`] nodes along each curve.
-    weights: [Vec<u64>; 2],
-}
-
-impl Arcs {
-    /// Cuts the graph into regions of at most so many bytes, or else of one span: where each ends along a curve. The first is
-    /// half as large if they are to be shifted.
-    fn cut(&self, most: u64, curve: usize, shifted: bool) -> Vec<u32> {
-        let (mut ends, mut sum) = (Vec::new(), 0);
-        if shifted && self.weights[curve].iter().sum::<u64>() > most {
-            sum = most / 2;
-        }
-        for (span, weight) in (0..).zip(&self.weights[curve]) {
-            if sum + weight > most && span > 0 {
-                ends.push(span * SPAN);
-                sum = 0;
-            }
-            sum += weight;
-        }
-        ends.push(NONE);
-        ends
-    }
-}
-
-/// Arcs that are being collected.
-pub(super) struct Collecting<'o> {
-    arcs: Arcs,
-    others: &'o mut Array<u32>,
-    last: Option<[u32; 3]>,
-}
-
-impl<'o> Collecting<'o> {
-    pub fn new(work: Work<'_>, others: &'o mut Array<u32>) -> io::Result<Self> {
-        let weights = vec![0; others.len().div_ceil(SPAN as usize)];
-        let arcs = Arcs { spool: work.scratch.spool()?, totals: (0, 0), weights: [weights.clone(), weights] };
-        Ok(Self { arcs, others, last: None })
-    }
-
-    /// Adds an arc that is not before the last one; those that are the same become one.
-    pub fn push(&mut self, arc: [u32; 3]) -> io::Result<()> {
-        match &mut self.last {
-            Some(last) if last[..2] == arc[..2] => {
-                last[2] += arc[2];
-                Ok(())
-            }
-            last => {
-                let before = last.replace(arc);
-                self.store(before, arc[0])
-            }
-        }
-    }
-
-    /// Stores an arc. The next one is of the node `next`.
-    fn store(&mut self, arc: Option<[u32; 3]>, next: u32) -> io::Result<()> {
-        let Some(arc @ [above, below, triangles]) = arc else { return Ok(()) };
-        self.arcs.totals = (self.arcs.totals.0 + 1, self.arcs.totals.1 + u64::from(triangles));
-        for node in [above, below].into_iter().filter(|&node| node != NONE) {
-            let bytes = ARC_BYTES + if node == above && above != next { NODE_BYTES } else { 0 };
-            for (weights, at) in self.arcs.weights.iter_mut().zip([node, self.others.get(node as usize)?]) {
-                weights[(at / SPAN) as usize] += bytes;
-            }
-        }
-        self.arcs.spool.push(arc)
-    }
-
-    pub fn finish(mut self) -> io::Result<Arcs> {
-        let last = self.last.take();
-        self.store(last, NONE)?;
-        Ok(self.arcs)
-    }
-}
 
 /// A graph that is being reduced.
 pub(super) struct Rounds<'a> {
@@ -132,19 +48,6 @@ pub(super) struct Rounds<'a> {
 
 /// Ways to cut a graph into regions: two curves, each cut in two ways.
 const WAYS: u32 = 4;
-
-/// Says which ends of an arc are in a region.
-pub(super) const ABOVE: u32 = 1;
-pub(super) const BELOW: u32 = 2;
-
-/// What a round, or a region of it, has come to.
-#[derive(Clone, Copy, Debug, Default)]
-pub(super) struct Outcome {
-    pub merged: u64,
-    pub refused: u64,
-    /// The least key of a candidate that was above the limit.
-    pub left: Option<f64>,
-}
 
 impl<'a> Rounds<'a> {
     pub fn new(work: Work<'a>, history: History, arcs: Arcs) -> io::Result<Self> {

@@ -17,12 +17,12 @@
 
 use std::io;
 
+use collapse_log::external::{Array, Sorter, Spool, too_few};
 use vertex_tree::NONE;
-use vertex_tree::external::{Array, Sorter, Spool};
 
+use super::arcs::{Arcs, Collecting};
 use super::history::{Fate, History};
-use super::rounds::{Arcs, Collecting};
-use super::{Failure, Work, too_few};
+use super::work::{Failure, Work};
 
 /// Follows the triangles. `take` gets the number of the triangle, the corners of each of its versions, the fate of the corner
 /// that is removed ([`Fate::STAYS`] in the base mesh) and the place of the node below.

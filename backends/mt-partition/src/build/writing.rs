@@ -6,17 +6,19 @@
 use std::fs::File;
 use std::io::{self, Write};
 
-use vertex_tree::external::{Array, Paged, Reader, Sorter, Spool};
-use vertex_tree::sections::{BY_PAGE, Kind, SectionWriter};
+use collapse_log::external::{Array, Paged, Reader, Sorter, Spool, too_few};
+use container::{BY_PAGE, Kind, SectionWriter};
 use vertex_tree::{Bounds, NONE};
 
 use super::arranging::{Arranged, bounds_of};
 use super::history::Fate;
+use super::report::WriteReport;
 use super::versions::follow;
-use super::{Failure, Work, WriteReport};
+use super::work::{Failure, Work};
 use crate::format::{HEADER, Header};
+use crate::options::BuildOptions;
+use crate::partition::QueueOrder;
 use crate::record::{Draft, Patch};
-use crate::{BuildOptions, QueueOrder};
 
 /// Writes the file.
 pub(super) fn write(
@@ -273,7 +275,7 @@ impl Records<'_, '_> {
     fn nodes_before(&mut self, end: u32) -> Result<(), Failure> {
         let (mut arcs, mut above) = (Vec::new(), Vec::new());
         while self.at < end {
-            let Some(node) = self.nodes.next() else { return Err(super::too_few().into()) };
+            let Some(node) = self.nodes.next() else { return Err(too_few().into()) };
             let [_, bounds @ .., layer] = node?;
             arcs.clear();
             above.clear();

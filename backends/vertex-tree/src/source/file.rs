@@ -27,7 +27,8 @@ impl FileSource {
     }
 
     /// The file itself.
-    pub(crate) fn file(&self) -> &File {
+    #[must_use]
+    pub fn file(&self) -> &File {
         &self.file
     }
 }

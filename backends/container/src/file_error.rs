@@ -1,0 +1,77 @@
+//! What can be wrong with a file of any format.
+
+use crate::error::SectionError;
+
+/// What can be wrong with a file before it is known what is in it.
+#[derive(Debug, thiserror::Error)]
+#[non_exhaustive]
+pub enum FileError {
+    /// The file is something else.
+    #[error("{file}: {what}: it does not start with \"{magic}\"")]
+    Foreign {
+        /// The file or store.
+        file: String,
+        /// What it is not, in words.
+        what: &'static str,
+        /// How it should start.
+        magic: &'static str,
+    },
+    /// The file was written by another version.
+    #[error("{file}: offset 8: version {version}, expected {expected}")]
+    Version {
+        /// The file or store.
+        file: String,
+        /// As found.
+        version: u32,
+        /// Those that are read, in words.
+        expected: &'static str,
+    },
+    /// The header names a vertex attribute layout that this version does not know.
+    #[error("{file}: offset 12: attribute stride {stride}, expected 0")]
+    Attributes {
+        /// The file or store.
+        file: String,
+        /// As found.
+        stride: u32,
+    },
+    /// The file is shorter or longer than its header says.
+    #[error("{file}: {actual} bytes, but its header asks for {expected}")]
+    Length {
+        /// The file or store.
+        file: String,
+        /// What the header says.
+        expected: u64,
+        /// What there is.
+        actual: u64,
+    },
+    /// Bytes have changed since the file was written.
+    #[error("{file}: offset {offset}: checksum of the {section} does not match")]
+    Checksum {
+        /// The file or store.
+        file: String,
+        /// Start of the damaged section.
+        offset: u64,
+        /// Its name.
+        section: &'static str,
+    },
+    /// The sections of the file are not what they should be.
+    #[error("{file}: {source}")]
+    Sections {
+        /// The file or store.
+        file: String,
+        /// What is wrong with them.
+        source: SectionError,
+    },
+}
+
+impl FileError {
+    /// What is wrong with the sections of a file, under the name that it has always had.
+    #[must_use]
+    pub fn of_sections(file: &str, error: SectionError) -> Self {
+        let file = file.to_owned();
+        match error {
+            SectionError::FileLength { expected, actual } => Self::Length { file, expected, actual },
+            source => Self::Sections { file, source },
+        }
+    }
+}
