@@ -18,7 +18,9 @@ use foldfront::collapse_log::CollapseLog;
 use foldfront::container::output;
 use foldfront::star_mesh::{LeafTriangle, StarMesh};
 use foldfront::vertex_tree::source::MappedSource;
-use foldfront::vertex_tree::{Bounds, Hierarchy, MeshSink, NONE, NodeId, PageStats, Step, TreeError, VertexTree};
+use foldfront::vertex_tree::{
+    Bounds, Hierarchy, MeshSink, NONE, NodeId, PageStats, Step, TreeError, VertexTree,
+};
 
 #[derive(Clone, Copy, Pod, Zeroable)]
 #[repr(C)]

@@ -5,7 +5,7 @@ use foldfront::cut::Displayed;
 use foldfront::engine::{Engine, Settings};
 use foldfront::oracle::Oracle;
 use foldfront::refine::Strategy;
-use foldfront::vertex_tree::{NONE, NullSink, Hierarchy};
+use foldfront::vertex_tree::{Hierarchy, NONE, NullSink};
 use meta_node::{BuildOptions, Dependencies, MetaNodeTree};
 
 use crate::common::backends::meta_node_file;

@@ -24,6 +24,8 @@ use in_memory::InMemoryTree;
 use meta_node::MetaNodeTree;
 use mt_partition::MtTree;
 
+const LATENCY: Duration = Duration::from_millis(5);
+
 /// A number for a sequence of numbers.
 fn digest(numbers: impl IntoIterator<Item = u64>) -> u64 {
     // FNV-1a, a word at a time, and mixed.
@@ -47,7 +49,10 @@ fn settled<T: Hierarchy + Refine<NullSink>>(tree: T, path: &Path, strategy: Stra
 fn table(kind: SceneKind, folder: &FilePath) -> String {
     let mut lines = String::new();
     let mesh = Scene::new(kind).mesh(&mut |_, _| ());
-    let log = simplify::build(mesh, &simplify::Options::default(), &mut |_, _| ()).unwrap().0;
+    // As on the command line, where the blocks of the city are joined.
+    let mut options = simplify::Options::default();
+    options.merge_components = kind == SceneKind::City;
+    let log = simplify::build(mesh, &options, &mut |_, _| ()).unwrap().0;
     for backend in Backend::ALL {
         let file = folder.join(backend.name());
         store::write(backend, &file, &log, &BuildOptions::default()).unwrap();
@@ -80,11 +85,10 @@ fn table(kind: SceneKind, folder: &FilePath) -> String {
             if backend == Backend::InMemory {
                 continue;
             }
-            let millisecond = Duration::from_millis(1);
             let timed = Options {
                 strategies: vec![Strategy::Event],
                 prefetch: vec![Loading::Paper, Loading::Schedule, Loading::None],
-                pace: Pace::Simulated(Duration::from_secs(1) / 60, Simulated::with_latency(5 * millisecond)),
+                pace: Pace::Simulated(Duration::from_secs_f64(1.0 / 60.0), Simulated::with_latency(LATENCY)),
                 ..Options::default()
             };
             for run in subject.replay(&path, all.clone(), &timed, &mut |_, _| ()).unwrap() {

@@ -20,7 +20,7 @@ use foldfront::oracle::Oracle;
 use foldfront::refine::Strategy;
 use foldfront::simplify;
 use foldfront::vertex_tree::source::{Faults, Faulty, MemorySource};
-use foldfront::vertex_tree::{MeshSink, NullSink, Hierarchy};
+use foldfront::vertex_tree::{Hierarchy, MeshSink, NullSink};
 use foldfront::view::View;
 use in_memory::{InMemoryHierarchy, InMemoryTree};
 use meta_node::{Dependencies, InUse, MetaNodeFile, MetaNodeTree};

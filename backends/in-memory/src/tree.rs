@@ -4,7 +4,8 @@ use std::sync::Arc;
 
 use star_mesh::{LeafTriangle, StarMesh};
 use vertex_tree::{
-    Bounds, MeshSink, NONE, NodeId, PageStats, Step, TreeError, TriangleId, VertexId, Hierarchy, VertexTree, prefetch,
+    Bounds, Hierarchy, MeshSink, NONE, NodeId, PageStats, Step, TreeError, TriangleId, VertexId, VertexTree,
+    prefetch,
 };
 
 use super::hierarchy::InMemoryHierarchy;

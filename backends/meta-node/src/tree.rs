@@ -6,7 +6,7 @@ use std::sync::Arc;
 use std::time::Duration;
 
 use star_mesh::{LeafTriangle, StarMesh};
-use vertex_tree::{Bounds, MeshSink, NodeId, PageStats, Step, TreeError, Hierarchy, VertexTree};
+use vertex_tree::{Bounds, Hierarchy, MeshSink, NodeId, PageStats, Step, TreeError, VertexTree};
 
 use crate::dependencies::{Half, Rules};
 use crate::error::MetaNodeError;

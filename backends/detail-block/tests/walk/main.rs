@@ -11,7 +11,7 @@ use collapse_log::{CollapseLog, Mesh};
 use detail_block::{Arrangement, BuildOptions, Io, Settings};
 use driver::{Driver, bytes_of, open};
 use meshes::{Random, grid, random_log, rubble, torus};
-use vertex_tree::{NodeId, Hierarchy, VertexTree};
+use vertex_tree::{Hierarchy, NodeId, VertexTree};
 
 fn options(levels: u32, quantize: bool, nest_needs: bool) -> BuildOptions {
     BuildOptions { levels, quantize, nest_needs }

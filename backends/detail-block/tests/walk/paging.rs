@@ -7,7 +7,7 @@ use collapse_log::CollapseLog;
 use detail_block::{ATTEMPTS, Arrangement, BuildOptions, Io, Settings, XfmFile};
 use vertex_tree::simulated::Simulated;
 use vertex_tree::source::{Faults, Faulty, MemorySource};
-use vertex_tree::{NodeId, Hierarchy};
+use vertex_tree::{Hierarchy, NodeId};
 
 use crate::driver::{Driver, bytes_of, open};
 use crate::meshes::{Random, random_log, torus};

@@ -7,7 +7,7 @@ use std::sync::Arc;
 use collapse_log::{Collapse, CollapseLog, Mesh};
 use meta_node::{BuildOptions, MetaNodeError, MetaNodeFile, MetaNodeTree};
 use vertex_tree::source::MemorySource;
-use vertex_tree::{Bounds, NodeId, NullSink, Step, Hierarchy, VertexTree};
+use vertex_tree::{Bounds, Hierarchy, NodeId, NullSink, Step, VertexTree};
 
 /// A small generator with a fixed sequence.
 pub struct Random(pub u64);
