@@ -188,11 +188,7 @@ fn index(name: &str, path: &std::path::Path, walk: &Path) {
             column.push(time);
         }
     }
-    let median = |column: &mut Vec<Duration>| {
-        column.sort_unstable();
-        column[column.len() / 2].as_secs_f64() * 1e3
-    };
-    let [read, mapped] = rows.each_mut().map(|row| row.each_mut().map(median));
+    let [read, mapped] = rows.each_mut().map(|row| row.each_mut().map(|column| median(column)));
     println!(
         "| {name}, {} | {:.3} | {:.3} | {:.3} | {:.3} | {:.3} | {:.3} |",
         walk.name, read[0], read[1], read[2], mapped[0], mapped[1], mapped[2]
@@ -245,14 +241,22 @@ fn cones(name: &str, file: &Arc<XfmFile>, path: &Path, strategy: Strategy) {
     );
 }
 
+/// What a file says of itself.
+fn fact(file: &XfmFile, wanted: &str) -> String {
+    let fact = file.facts().into_iter().find(|&(name, _)| name == wanted);
+    fact.map_or_else(String::new, |(_, value)| value)
+}
+
+/// In milliseconds.
+fn median(times: &mut [Duration]) -> f64 {
+    times.sort_unstable();
+    times[times.len() / 2].as_secs_f64() * 1e3
+}
+
 /// What the file would take with a place for every node that a block can have, and with two numbers of children's blocks in
 /// every place of a block's lowest level.
 fn packing(file: &XfmFile) {
-    let facts = file.facts();
-    let fact = |wanted: &str| -> u64 {
-        let found = facts.iter().find(|&&(name, _)| name == wanted);
-        found.and_then(|(_, value)| value.parse().ok()).expect("a number")
-    };
+    let fact = |wanted: &str| -> u64 { fact(file, wanted).parse().expect("a number") };
     let (bytes, nodes, blocks) = (fact("bytes"), fact("nodes"), fact("detail blocks"));
     let (node_bytes, levels) = (fact("node bytes"), fact("levels a block"));
     let unpacked = bytes + (blocks * ((1 << levels) - 1) - nodes) * node_bytes;
@@ -279,10 +283,7 @@ fn first_frame(name: &str, path: &std::path::Path, walk: &Path) {
         engine.advance(&[view(walk, 0)]).expect("the store is there");
         times[1].push(start.elapsed());
     }
-    let [coarse, first] = times.map(|mut times| {
-        times.sort_unstable();
-        times[RUNS / 2].as_secs_f64() * 1e3
-    });
+    let [coarse, first] = times.map(|mut times| median(&mut times));
     println!("| {name}, {} | {coarse:.1} | {first:.1} |", walk.name);
 }
 
@@ -358,10 +359,7 @@ fn main() {
         let simplified = start.elapsed().as_secs_f64();
         let (plain, quantised) = (built(&log, &build(false, true)), built(&log, &build(true, true)));
         let forcing = built(&log, &build(false, false));
-        let fact = |built: &Built, wanted: &str| {
-            let facts = built.file.facts();
-            facts.into_iter().find(|&(name, _)| name == wanted).map_or_else(String::new, |(_, value)| value)
-        };
+        let fact = |built: &Built, wanted: &str| fact(&built.file, wanted);
         let faces = log.mesh.triangles.len() as f64;
         println!(
             "\n| {name}: faces | bytes | a triangle | quantised | blocks | leaf blocks | nodes a block |"

@@ -152,16 +152,7 @@ impl FrameReport {
             unfolds: a.unfolds + b.unfolds,
             folds: a.folds + b.folds,
             forced: a.forced + b.forced,
-            pages: PageStats {
-                reads: a.pages.reads + b.pages.reads,
-                read_bytes: a.pages.read_bytes + b.pages.read_bytes,
-                faults: a.pages.faults + b.pages.faults,
-                ahead: a.pages.ahead + b.pages.ahead,
-                ahead_used: a.pages.ahead_used + b.pages.ahead_used,
-                no_room: a.pages.no_room + b.pages.no_room,
-                stalled: a.pages.stalled + b.pages.stalled,
-                resident_bytes: b.pages.resident_bytes,
-            },
+            pages: PageStats { resident_bytes: b.pages.resident_bytes, ..a.pages + b.pages },
             ..*b
         }
     }

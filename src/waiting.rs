@@ -27,18 +27,13 @@ impl Change {
 /// The changes that wait.
 #[derive(Default)]
 pub(crate) struct Waiting {
-    /// In the order in which they were refused. What the front knows nothing of any more is dropped when it is come upon.
+    /// In the order in which they were refused: at the end of a frame, those that waited then. What the front knows nothing of any more is dropped when it is come upon.
     pub changes: Vec<Change>,
     /// Nodes whose pages nobody waits for any more. Kept for its allocation.
     pub given_up: Vec<NodeId>,
 }
 
 impl Waiting {
-    /// Those that waited at the end of the frame.
-    pub fn changes(&self) -> &[Change] {
-        &self.changes
-    }
-
     /// Those that wait still: the front knows of them, and nothing that has happened in the frame has made them impossible.
     pub fn valid(&self, front: &Front) -> impl Iterator<Item = (Slot, Kind)> {
         let is_possible = |change: &&Change| {

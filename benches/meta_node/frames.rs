@@ -25,7 +25,7 @@ use meta_node::{BuildOptions, MetaNodeTree, Settings};
 
 use crate::misses::{CAR, DRONE};
 use crate::selection::settings;
-use crate::subject::{imported, kept, log, meta_nodes, open, spread, views};
+use crate::subject::{imported, is_chosen, kept, log, meta_nodes, open, spread, views};
 use crate::virtual_memory::{self, MappedTree};
 
 /// Each replay is made this often. Of each frame the least times count: what else the machine does can only add.
@@ -52,10 +52,8 @@ pub fn table(words: &[String]) {
         "mesh     of the file  tree      frames   us a frame: mean  median      p99      max   misses %  changes/frame  \
          triangles  major faults   of the first view"
     );
-    let is_named = |name: &str| words.iter().any(|word| word == name);
-    let is_choice = MESHES.iter().any(|&(name, _)| is_named(name));
     for (name, (trajectory, mode, rate)) in MESHES {
-        if is_choice && !is_named(name) {
+        if !is_chosen(name, words, MESHES.map(|(name, _)| name)) {
             continue;
         }
         let Some((log, _)) = log(name) else { continue };

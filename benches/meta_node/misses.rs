@@ -15,7 +15,7 @@ use foldfront::view::View;
 use meta_node::{BuildOptions, InUse, Io, MetaNodeTree, Settings};
 
 use crate::selection::settings;
-use crate::subject::{imported, log, meta_nodes, open, views};
+use crate::subject::{imported, is_chosen, log, meta_nodes, open, views};
 
 pub const DRONE: (&str, Mode, f64) = ("euroc_mh04_drone.txt", Mode::Fly, 60.0);
 pub const CAR: (&str, Mode, f64) = ("kitti_00_car_10hz.txt", Mode::Walk, 30.0);
@@ -37,14 +37,12 @@ const REAL_FRAMES: usize = 1200;
 
 /// Of the meshes that are named, or of all.
 pub fn table(words: &[String]) {
-    let is_named = |name: &str| words.iter().any(|word| word == name);
-    let is_choice = PATHS.iter().any(|(name, ..)| is_named(name));
     println!(
         "path   mesh     memory  in use  prefetch  latency    frames  misses %  frames with a miss %  changes  reads/frame  \
          of these ahead %, used %  no room  active"
     );
     for (name, (trajectory, mode, rate), pixels) in PATHS {
-        if is_choice && !is_named(name) {
+        if !is_chosen(name, words, PATHS.map(|(name, ..)| name)) {
             continue;
         }
         let Some((log, _)) = log(name) else { continue };

@@ -17,6 +17,12 @@ pub fn shared(name: &str) -> Option<PathBuf> {
     path.exists().then_some(path)
 }
 
+/// Whether a name is among some words, or none of `all` is.
+pub fn is_chosen(name: &str, words: &[String], all: impl IntoIterator<Item = &'static str>) -> bool {
+    let is_named = |name: &str| words.iter().any(|word| word == name);
+    is_named(name) || !all.into_iter().any(is_named)
+}
+
 /// A file that is kept between runs.
 pub fn kept(name: &str) -> PathBuf {
     let folder = PathBuf::from(env!("CARGO_TARGET_TMPDIR")).join("strategies");

@@ -6,39 +6,22 @@ use std::path::Path as FilePath;
 use foldfront::CollapseLog;
 use foldfront::compare::{Loading, Pace, Run, Subject};
 use foldfront::path::Path;
-use foldfront::path::import::{self, Mode};
 use foldfront::vertex_tree::simulated::Simulated;
 
-use crate::{DATA, FRAME, FRAMES, LATENCY, memory, open, options};
-
-/// Name, file, and how it is placed around a mesh and around a terrain.
-const TRAJECTORIES: [(&str, &str, [Mode; 2]); 6] = [
-    ("drone", "euroc_mh04_drone.txt", [Mode::Orbit, Mode::Fly]),
-    ("car", "kitti_00_car_10hz.txt", [Mode::Orbit, Mode::Walk]),
-    ("canyon", "gcanyon_flight_hoppe.txt", [Mode::Orbit, Mode::Fly]),
-    ("canyon 4k", "gcanyon_4k2k_fly4.edited.frames", [Mode::Orbit, Mode::Fly]),
-    ("soaring", "soaring_flight_hohe_tauern_dachstein_1hz.txt", [Mode::Orbit, Mode::Fly]),
-    ("hand-held", "tum_fr2_desk_handheld_60hz.txt", [Mode::Orbit, Mode::Fly]),
-];
+use crate::{FRAME, FRAMES, LATENCY, TRAJECTORIES, imported, memory, open, options};
 
 /// Stretches of each, evenly spread from its first frame to its last.
 const STRETCHES: usize = 5;
 
 /// The stretches of all trajectories, brought to a mesh or a terrain.
-pub fn stretches(log: &CollapseLog, is_terrain: bool) -> Vec<Path> {
+pub fn stretches(mesh: &str, log: &CollapseLog) -> Vec<Path> {
     let mut all = Vec::new();
-    for (name, file, modes) in TRAJECTORIES {
-        let file = FilePath::new(DATA).join("paths").join(file);
-        if !file.exists() {
-            continue;
-        }
-        let options = import::Options { mode: modes[usize::from(is_terrain)], ..import::Options::default() };
-        let path = import::import(&file, &log.mesh, &options).expect("a trajectory");
+    for path in TRAJECTORIES.iter().filter_map(|trajectory| imported(trajectory, mesh, log)) {
         let length = path.frames.len().min(FRAMES);
         for stretch in 0..STRETCHES {
             let start = (path.frames.len() - length) * stretch / (STRETCHES - 1);
             let frames = path.frames[start..start + length].to_vec();
-            all.push(Path { name: format!("{name} {start}"), frames, ..path.clone() });
+            all.push(Path { name: format!("{} {start}", path.name), frames, ..path.clone() });
         }
     }
     all

@@ -33,11 +33,18 @@ const MESHES: [(&str, &[&str]); 4] = [
 ];
 
 /// Name, file, and how it is placed around a mesh and around a terrain.
-const PATHS: [(&str, &str, [Mode; 2]); 3] = [
-    ("drone", "paths/euroc_mh04_drone.txt", [Mode::Orbit, Mode::Fly]),
-    ("car", "paths/kitti_00_car_10hz.txt", [Mode::Orbit, Mode::Walk]),
-    ("flight", "paths/gcanyon_flight_hoppe.txt", [Mode::Orbit, Mode::Fly]),
+type Trajectory = (&'static str, &'static str, [Mode; 2]);
+
+/// The first [`WALKS`] are those of all tables, the others of `--bytes` alone.
+const TRAJECTORIES: [Trajectory; 6] = [
+    ("drone", "euroc_mh04_drone.txt", [Mode::Orbit, Mode::Fly]),
+    ("car", "kitti_00_car_10hz.txt", [Mode::Orbit, Mode::Walk]),
+    ("flight", "gcanyon_flight_hoppe.txt", [Mode::Orbit, Mode::Fly]),
+    ("flight 4k", "gcanyon_4k2k_fly4.edited.frames", [Mode::Orbit, Mode::Fly]),
+    ("soaring", "soaring_flight_hohe_tauern_dachstein_1hz.txt", [Mode::Orbit, Mode::Fly]),
+    ("hand-held", "tum_fr2_desk_handheld_60hz.txt", [Mode::Orbit, Mode::Fly]),
 ];
+const WALKS: usize = 3;
 
 const BACKENDS: [Backend; 3] = [Backend::MetaNode, Backend::DetailBlock, Backend::MtPartition];
 
@@ -89,27 +96,33 @@ fn hierarchy(mesh: &str, files: &[&str]) -> Option<foldfront::CollapseLog> {
     Some(built.expect("a mesh").0)
 }
 
+/// A trajectory brought to a mesh or a terrain, whole; `None` where it is not at hand.
+fn imported(&(name, file, modes): &Trajectory, mesh: &str, log: &foldfront::CollapseLog) -> Option<Path> {
+    let file = FilePath::new(DATA).join("paths").join(file);
+    let mode = modes[usize::from(is_terrain(mesh))];
+    let options = import::Options { mode, ..import::Options::default() };
+    let path = file.exists().then(|| import::import(&file, &log.mesh, &options).expect("a trajectory"))?;
+    Some(Path { name: name.to_owned(), ..path })
+}
+
 fn is_terrain(mesh: &str) -> bool {
     matches!(mesh, "tile" | "sierra")
 }
 
 fn compare(mesh: &str, log: &foldfront::CollapseLog, parts: Parts) {
     let folder = tempfile::tempdir().expect("room for files");
-    let walks: Vec<Path> = PATHS
-        .iter()
-        .filter_map(|&(name, file, modes)| {
-            let options =
-                import::Options { mode: modes[usize::from(is_terrain(mesh))], ..import::Options::default() };
-            let file = FilePath::new(DATA).join(file);
-            let mut path =
-                file.exists().then(|| import::import(&file, &log.mesh, &options).expect("a trajectory"))?;
-            path.name = name.to_owned();
+    let walks: Vec<Path> = if parts.misses || parts.slow || parts.wall_clock {
+        let walk = |trajectory| {
+            let mut path = imported(trajectory, mesh, log)?;
             let middle = path.frames.len() / 2;
             path.frames = path.frames[middle..].iter().copied().take(FRAMES).collect();
             Some(path)
-        })
-        .collect();
-    let stretches = if parts.bytes { bytes::stretches(log, is_terrain(mesh)) } else { Vec::new() };
+        };
+        TRAJECTORIES[..WALKS].iter().filter_map(walk).collect()
+    } else {
+        Vec::new()
+    };
+    let stretches = if parts.bytes { bytes::stretches(mesh, log) } else { Vec::new() };
     for backend in BACKENDS {
         let file = folder.path().join(backend.name());
         store::write(backend, &file, log, &BuildOptions::default()).expect("room for files");

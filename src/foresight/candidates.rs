@@ -72,7 +72,7 @@ impl Candidates {
             }
         };
         // What is refused now is wrong at the next instant too, if it is still in play.
-        for change in waiting.changes().iter().filter(|change| front.is_waiting(change.slot)) {
+        for change in waiting.changes.iter().filter(|change| front.is_waiting(change.slot)) {
             take(change.slot, change.kind, &front.bounds(change.slot));
         }
         // So is what is carried, which these strategies do not watch meanwhile.

@@ -127,12 +127,5 @@ fn add(all: &mut FrameReport, report: &FrameReport, number: u64) {
     if report.limit != Limit::Error {
         all.limit = report.limit;
     }
-    all.pages.reads += report.pages.reads;
-    all.pages.read_bytes += report.pages.read_bytes;
-    all.pages.resident_bytes += report.pages.resident_bytes;
-    all.pages.faults += report.pages.faults;
-    all.pages.ahead += report.pages.ahead;
-    all.pages.ahead_used += report.pages.ahead_used;
-    all.pages.no_room += report.pages.no_room;
-    all.pages.stalled += report.pages.stalled;
+    all.pages = all.pages + report.pages;
 }

@@ -1,5 +1,6 @@
 //! What a backend that pages is told, and what it says of a frame.
 
+use std::ops::Add;
 use std::time::Duration;
 
 /// What paging did in a frame.
@@ -23,6 +24,24 @@ pub struct PageStats {
     /// How long changes have waited for the store since the last call. No backend lets them; whoever makes them wait, as
     /// foldfront's `Settled`, says so here.
     pub stalled: Duration,
+}
+
+impl Add for PageStats {
+    type Output = Self;
+
+    /// What two trees did in a frame: the sums, of what is in memory too.
+    fn add(self, other: Self) -> Self {
+        Self {
+            reads: self.reads + other.reads,
+            read_bytes: self.read_bytes + other.read_bytes,
+            resident_bytes: self.resident_bytes + other.resident_bytes,
+            faults: self.faults + other.faults,
+            ahead: self.ahead + other.ahead,
+            ahead_used: self.ahead_used + other.ahead_used,
+            no_room: self.no_room + other.no_room,
+            stalled: self.stalled + other.stalled,
+        }
+    }
 }
 
 /// What fetches pages before a change needs them.
