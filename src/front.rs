@@ -16,6 +16,7 @@ use slab::Slab;
 use vertex_tree::{Bounds, Hierarchy, NONE, NodeId, prefetch};
 
 use crate::in_play::{Kind, Slot};
+use crate::slot_table::SlotTable;
 
 /// A node's record: half a cache line.
 #[derive(Clone, Copy)]
@@ -89,7 +90,7 @@ pub struct Front {
     roots: Vec<u32>,
     root_slots: Vec<(NodeId, Slot)>,
     /// For each node in play, its slot. Kept only for graphs: in a tree, what is linked says it all.
-    slots: Vec<Slot>,
+    slots: Option<SlotTable>,
     /// A bit for each node that is active. Kept only for graphs.
     active_bits: Vec<u64>,
     active: usize,
@@ -107,7 +108,7 @@ impl Front {
             spare: Vec::new(),
             roots: Vec::new(),
             root_slots: Vec::new(),
-            slots: if T::IS_TREE { Vec::new() } else { vec![Slot::NONE; tree.node_limit() as usize] },
+            slots: (!T::IS_TREE).then(|| SlotTable::new(tree.node_limit())),
             active_bits: if T::IS_TREE {
                 Vec::new()
             } else {
@@ -259,7 +260,7 @@ impl Front {
     ) -> impl Iterator<Item = Slot> + 'a {
         let linked = if T::IS_TREE { self.below(self.record(slot)) } else { &[] };
         let others = (!T::IS_TREE).then(|| tree.children(self.node(slot)));
-        let others = others.into_iter().flatten().map(|child| self.slots[child.index()]);
+        let others = others.into_iter().flatten().map(|child| self.slot_of(child));
         self.slots_in(linked).chain(others.filter(|&slot| slot != Slot::NONE))
     }
 
@@ -272,14 +273,20 @@ impl Front {
     ) -> impl Iterator<Item = Slot> + 'a {
         let linked = T::IS_TREE.then(|| self.above[slot.pair()]);
         let others = (!T::IS_TREE).then(|| tree.parents(self.node(slot)));
-        let others = others.into_iter().flatten().map(|parent| self.slots[parent.index()]);
+        let others = others.into_iter().flatten().map(|parent| self.slot_of(parent));
         linked.into_iter().chain(others).filter(|&slot| slot != Slot::NONE)
+    }
+
+    /// Where a node of a graph is.
+    #[inline(always)]
+    fn slot_of(&self, node: NodeId) -> Slot {
+        self.slots.as_ref().map_or(Slot::NONE, |slots| slots.get(node))
     }
 
     /// Where a node is; [`Slot::NONE`] if it is not in play. In a tree this follows the links from the node's root down.
     pub(crate) fn find<T: Hierarchy>(&self, tree: &T, node: NodeId) -> Slot {
         if !T::IS_TREE {
-            return self.slots[node.index()];
+            return self.slot_of(node);
         }
         let parent = |node: &NodeId| tree.parents(*node).next();
         let mut path: Vec<NodeId> = std::iter::successors(Some(node), parent).collect();
@@ -313,9 +320,9 @@ impl Front {
                 self.pairs.len() as u32 - 1
             }
         };
-        if !self.slots.is_empty() {
+        if let Some(slots) = &mut self.slots {
             for (slot, (node, _)) in (2 * pair..).zip(nodes.into_iter().flatten()) {
-                self.slots[node.index()] = Slot(slot);
+                slots.insert(node, Slot(slot));
             }
         }
         pair
@@ -323,10 +330,10 @@ impl Front {
 
     #[inline(always)]
     fn remove_pair(&mut self, pair: u32) {
-        if !self.slots.is_empty() {
+        if let Some(slots) = &mut self.slots {
             for record in self.pairs[pair as usize].0 {
                 if record.node.0 != NONE {
-                    self.slots[record.node.index()] = Slot::NONE;
+                    slots.remove(record.node);
                 }
             }
         }

@@ -97,6 +97,7 @@ pub mod report;
 pub mod scene;
 pub mod settled;
 pub mod simplify;
+mod slot_table;
 #[cfg(all(feature = "in-memory", feature = "meta-node", feature = "detail-block", feature = "mt-partition"))]
 pub mod store;
 pub mod view;
@@ -113,6 +114,7 @@ pub use glam;
 pub use in_memory;
 #[cfg(feature = "mt-partition")]
 pub use mt_partition;
+pub use page_store;
 pub use star_mesh;
 pub use vertex_tree;
 pub use vertex_tree::{Bounds, Hierarchy, NodeId, Refine, VertexTree};

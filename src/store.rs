@@ -12,7 +12,7 @@ use detail_block::{XfmError, XfmFile};
 use in_memory::InMemoryHierarchy;
 use meta_node::{Dependencies, MetaNodeError, MetaNodeFile};
 use mt_partition::{MtError, MtFile};
-use vertex_tree::source::{FileSource, PageSource};
+use page_store::source::{FileSource, PageSource};
 
 /// Where a hierarchy is kept.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]

@@ -7,9 +7,9 @@
 use std::time::{Duration, Instant};
 
 use foldfront::engine::Engine;
+use foldfront::page_store::Simulated;
 use foldfront::path::import::Mode;
 use foldfront::refine::Strategy;
-use foldfront::vertex_tree::simulated::Simulated;
 use foldfront::vertex_tree::{Hierarchy, NullSink, Prefetch};
 use foldfront::view::View;
 use meta_node::{BuildOptions, InUse, Io, MetaNodeTree, Settings};

@@ -4,9 +4,9 @@ use std::path::PathBuf;
 use std::sync::Arc;
 
 use foldfront::collapse_log::{read_log, write_log};
+use foldfront::page_store::source::FileSource;
 use foldfront::path::Path;
 use foldfront::path::import::{Mode, Options, import};
-use foldfront::vertex_tree::source::FileSource;
 use foldfront::view::{View, theta_of_pixels};
 use foldfront::{CollapseLog, mesh_io, simplify};
 use meta_node::{BuildOptions, MetaNodeFile};

@@ -16,8 +16,8 @@ use std::path::Path;
 use bytemuck::{Pod, Zeroable};
 use foldfront::collapse_log::CollapseLog;
 use foldfront::container::output;
+use foldfront::page_store::source::MappedSource;
 use foldfront::star_mesh::{LeafTriangle, StarMesh};
-use foldfront::vertex_tree::source::MappedSource;
 use foldfront::vertex_tree::{
     Bounds, Hierarchy, MeshSink, NONE, NodeId, PageStats, Step, TreeError, VertexTree,
 };

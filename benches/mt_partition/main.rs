@@ -28,9 +28,9 @@ use std::time::Instant;
 
 use foldfront::collapse_log::{read_log, write_log};
 use foldfront::engine::{Engine, FrameReport, Settings};
+use foldfront::page_store::source::FileSource;
 use foldfront::path::{Path, Pose};
 use foldfront::refine::Strategy;
-use foldfront::vertex_tree::source::FileSource;
 use foldfront::vertex_tree::{MeshSink, NullSink, VertexTree};
 use foldfront::view::{Camera, View, theta_of_pixels};
 use foldfront::{CollapseLog, Mesh, mesh_io, simplify};

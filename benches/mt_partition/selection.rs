@@ -5,10 +5,10 @@ use std::sync::Arc;
 
 use foldfront::CollapseLog;
 use foldfront::engine::{Engine, FrameReport};
+use foldfront::page_store::source::FileSource;
 use foldfront::path::import::{Mode, Options, import};
 use foldfront::path::{self, Path};
 use foldfront::refine::Strategy;
-use foldfront::vertex_tree::source::FileSource;
 use foldfront::vertex_tree::{Hierarchy, NullSink, VertexTree};
 use foldfront::view::View;
 use in_memory::{InMemoryHierarchy, InMemoryTree};

@@ -6,8 +6,8 @@ use std::sync::atomic::AtomicBool;
 use std::time::Instant;
 
 use foldfront::CollapseLog;
+use foldfront::page_store::source::FileSource;
 use foldfront::vertex_tree::NodeId;
-use foldfront::vertex_tree::source::FileSource;
 use mt_partition::{BuildOptions, MtFile, Workspace};
 
 /// Tolerance of one pixel in an image of 1080 lines with a field of view of 60 degrees.

@@ -5,8 +5,8 @@ use std::path::Path as FilePath;
 
 use foldfront::CollapseLog;
 use foldfront::compare::{Loading, Pace, Run, Subject};
+use foldfront::page_store::Simulated;
 use foldfront::path::Path;
-use foldfront::vertex_tree::simulated::Simulated;
 
 use crate::{FRAME, FRAMES, LATENCY, TRAJECTORIES, imported, memory, open, options};
 

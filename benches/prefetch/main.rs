@@ -16,12 +16,12 @@ use foldfront::collapse_log::read_log;
 use foldfront::compare::csv::Summary;
 use foldfront::compare::{Loading, Options, Pace, Paging, Run, Subject};
 use foldfront::mesh_io;
+use foldfront::page_store::Simulated;
 use foldfront::path::import::{self, Mode};
 use foldfront::path::{Path, Pose};
 use foldfront::refine::Strategy;
 use foldfront::simplify;
 use foldfront::store::{self, Backend, BuildOptions, Store};
-use foldfront::vertex_tree::simulated::Simulated;
 
 const DATA: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/../shared/data");
 

@@ -10,10 +10,10 @@ use std::sync::atomic::{AtomicU64, Ordering};
 use std::time::Duration;
 
 use foldfront::compare::{Loading, Pace, Row, Subject};
+use foldfront::page_store::Simulated;
+use foldfront::page_store::source::{FileSource, PageSource};
 use foldfront::path::Path;
 use foldfront::store::Store;
-use foldfront::vertex_tree::simulated::Simulated;
-use foldfront::vertex_tree::source::{FileSource, PageSource};
 
 use crate::{FRAME, open, options};
 

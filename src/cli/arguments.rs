@@ -8,7 +8,7 @@ use clap::{Args, Parser, Subcommand, ValueEnum};
 use glam::{DQuat, DVec3};
 use meta_node::Dependencies;
 use mt_partition::CacheMode;
-use vertex_tree::simulated::Simulated;
+use page_store::Simulated;
 
 use super::say::Misunderstood;
 use super::values::{backend, cache, duration, frames, positive, prefetch, size, strategy, work_cap};

@@ -2,8 +2,8 @@
 
 use meta_node::InUse;
 use mt_partition::Memory;
+use page_store::Simulated;
 use vertex_tree::Hierarchy;
-use vertex_tree::simulated::Simulated;
 
 use super::loading::Loading;
 use super::options::{Pace, Paging};

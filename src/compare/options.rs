@@ -4,7 +4,7 @@ use std::time::Duration;
 
 use meta_node::Dependencies;
 use mt_partition::CacheMode;
-use vertex_tree::simulated::Simulated;
+use page_store::Simulated;
 
 use super::error::CompareError;
 use super::loading::Loading;

@@ -21,7 +21,7 @@ impl Front {
     ) {
         let node = self.node(slot);
         for parent in tree.parents(node) {
-            let parent = self.slots[parent.index()];
+            let parent = self.slot_of(parent);
             if parent != Slot::NONE {
                 let record = self.record_mut(parent);
                 if record.is_collapsible() {
@@ -41,7 +41,9 @@ impl Front {
                     Some(&pair) => {
                         self.pairs[pair as usize].0[1] =
                             Record { bounds, node: child, children: 0, status: 0 };
-                        self.slots[child.index()] = Slot(2 * pair + 1);
+                        if let Some(slots) = &mut self.slots {
+                            slots.insert(child, Slot(2 * pair + 1));
+                        }
                         pair
                     }
                     None => {
@@ -56,7 +58,7 @@ impl Front {
                     ready.push(child);
                 }
             } else {
-                let child = self.slots[child.index()];
+                let child = self.slot_of(child);
                 let record = self.record_mut(child);
                 // A child that waits for nothing, or is active, does not name this parent: the store is damaged.
                 if child != Slot::NONE && !record.is_active() && !record.is_boundary() {
@@ -98,7 +100,7 @@ impl Front {
         record.children = 0;
         self.active_bits[node.index() / 64] &= !(1 << (node.0 % 64));
         for child in tree.children(node) {
-            let child = self.slots[child.index()];
+            let child = self.slot_of(child);
             if child != Slot::NONE {
                 release(child);
                 // What stays in play is linked below another parent, and waits for this one again.
@@ -113,7 +115,7 @@ impl Front {
             self.remove_pair(children);
         }
         for parent in tree.parents(node) {
-            let parent = self.slots[parent.index()];
+            let parent = self.slot_of(parent);
             if parent != Slot::NONE {
                 let record = self.record_mut(parent);
                 if !record.is_collapsible() {

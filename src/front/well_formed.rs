@@ -4,6 +4,7 @@ use vertex_tree::{Hierarchy, NONE, NodeId};
 
 use super::{ACTIVE, COUNT, Front, MANY, Record, mix};
 use crate::in_play::Slot;
+use crate::slot_table::SlotTable;
 
 impl Front {
     /// Checks that every pair of records is linked once or free, that each node in play has the record that the backend's
@@ -58,8 +59,8 @@ impl Front {
         assert_eq!(many, self.many.len(), "lists of pairs in use");
         assert!(self.spare.iter().all(Vec::is_empty), "lists of pairs to use again");
         if !T::IS_TREE {
-            let slots = self.slots.iter().filter(|&&slot| slot != Slot::NONE).count();
-            assert_eq!(slots, in_play, "nodes with a slot");
+            let slots = self.slots.as_ref().map(SlotTable::len);
+            assert_eq!(slots, Some(in_play), "nodes with a slot");
             let bits: u32 = self.active_bits.iter().map(|bits| bits.count_ones()).sum();
             assert_eq!(bits as usize, active, "nodes whose bit says that they are active");
         }
@@ -70,11 +71,11 @@ impl Front {
     fn assert_record<T: Hierarchy>(&self, tree: &T, slot: Slot, record: &Record) {
         let node = record.node;
         let is_active = |node: NodeId| {
-            let slot = self.slots[node.index()];
+            let slot = self.slot_of(node);
             slot != Slot::NONE && self.record(slot).is_active()
         };
         if !T::IS_TREE {
-            assert_eq!(self.slots[node.index()], slot, "the slot of {node:?}");
+            assert_eq!(self.slot_of(node), slot, "the slot of {node:?}");
             let bit = self.active_bits[node.index() / 64] >> (node.0 % 64) & 1 == 1;
             assert_eq!(bit, record.is_active(), "the bit of {node:?}");
         }

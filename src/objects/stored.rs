@@ -174,7 +174,7 @@ impl StoredScene {
             paging.mt_partition.memory = Memory::new(part as u64);
         }
         if together > 0 && paging.mt_partition.reader.is_none() {
-            paging.mt_partition.reader = Some(Reader::new().map_err(StoredSceneError::Thread)?);
+            paging.mt_partition.reader = Some(Reader::new()?);
         }
         Ok(paging)
     }

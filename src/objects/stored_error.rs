@@ -3,6 +3,7 @@
 use std::path::PathBuf;
 
 use collapse_log::LogError;
+use page_store::ThreadError;
 use vertex_tree::TreeError;
 
 use super::scene_file::SceneFileError;
@@ -42,8 +43,8 @@ pub enum StoredSceneError {
         source: LogError,
     },
     /// A thread that reads can not be had.
-    #[error("the thread that reads: {0}")]
-    Thread(std::io::Error),
+    #[error(transparent)]
+    Thread(#[from] ThreadError),
     /// An object can not go on.
     #[error("{at}: {}", at.named(source))]
     Tree {

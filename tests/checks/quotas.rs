@@ -5,9 +5,9 @@ use std::time::Duration;
 use detail_block::{Arrangement, Io, XfmTree};
 use foldfront::CollapseLog;
 use foldfront::engine::Engine;
+use foldfront::page_store::Simulated;
 use foldfront::path::around;
 use foldfront::refine::Strategy;
-use foldfront::vertex_tree::simulated::Simulated;
 use foldfront::vertex_tree::{Hierarchy, NullSink, Prefetch};
 use foldfront::view::theta_of_pixels;
 

@@ -12,8 +12,8 @@ use foldfront::CollapseLog;
 use foldfront::budget::Budget;
 use foldfront::engine::{Engine, FrameReport, Settings};
 use foldfront::oracle::Oracle;
+use foldfront::page_store::source::MemorySource;
 use foldfront::refine::Strategy;
-use foldfront::vertex_tree::source::MemorySource;
 use foldfront::vertex_tree::{Hierarchy, NONE, NullSink};
 use foldfront::view::View;
 

@@ -6,7 +6,7 @@ use std::sync::Arc;
 use foldfront::criterion::Criterion;
 use foldfront::engine::Engine;
 use foldfront::front::mix;
-use foldfront::vertex_tree::source::MemorySource;
+use foldfront::page_store::source::MemorySource;
 use foldfront::vertex_tree::{NodeId, Refine};
 use foldfront::view::View;
 use foldfront::{Bounds, CollapseLog};

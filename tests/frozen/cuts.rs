@@ -3,6 +3,9 @@
 //! `cuts.txt` has a line for each file that is written of a built-in scene, for each recorded path through it, backend and
 //! strategy (every frame's cut, its size and its triangles), and for each way to fetch ahead on virtual time (every frame's cut,
 //! misses, reads and bytes). Where something is meant to change, the new table is printed, to be looked at.
+//!
+//! Changed since: `laserscan-wild meta-node schedule`, where seven pages are read two frames earlier. How long reads take is noted
+//! after what was known of it has faded for the frame, in all backends.
 
 use std::fmt::Write;
 use std::path::Path as FilePath;
@@ -11,13 +14,13 @@ use std::time::Duration;
 use detail_block::XfmTree;
 use foldfront::compare::{Loading, Options, Pace, Subject};
 use foldfront::engine::{Engine, Settings};
+use foldfront::page_store::Simulated;
 use foldfront::path::{Path, recorded};
 use foldfront::refine::Strategy;
 use foldfront::scene::{Scene, SceneKind};
 use foldfront::settled::Settled;
 use foldfront::simplify;
 use foldfront::store::{self, Backend, BuildOptions, Store};
-use foldfront::vertex_tree::simulated::Simulated;
 use foldfront::vertex_tree::{Hierarchy, NullSink, Prefetch, Refine};
 use foldfront::view::theta_of_pixels;
 use in_memory::InMemoryTree;

@@ -3,8 +3,8 @@
 use std::path::Path;
 use std::sync::Arc;
 
+use foldfront::page_store::source::MemorySource;
 use foldfront::store::{Store, StoreError};
-use foldfront::vertex_tree::source::MemorySource;
 
 use super::{EXTENSIONS, frozen, germany};
 

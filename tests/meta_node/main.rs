@@ -3,6 +3,9 @@
 #[path = "../common/mod.rs"]
 mod common;
 mod dependencies;
+#[path = "../checks/lies.rs"]
+mod lies;
+mod lying;
 #[path = "../checks/dependencies.rs"]
 mod needs;
 mod rest;
@@ -17,9 +20,9 @@ use foldfront::collapse_log::CollapseLog;
 use foldfront::cut::Displayed;
 use foldfront::engine::{Engine, FrameReport, Settings};
 use foldfront::oracle::Oracle;
+use foldfront::page_store::source::{Faults, Faulty, MemorySource};
 use foldfront::refine::Strategy;
 use foldfront::simplify;
-use foldfront::vertex_tree::source::{Faults, Faulty, MemorySource};
 use foldfront::vertex_tree::{Hierarchy, MeshSink, NullSink};
 use foldfront::view::View;
 use in_memory::{InMemoryHierarchy, InMemoryTree};

@@ -6,8 +6,8 @@ use std::time::Duration;
 
 use foldfront::engine::{Engine, FrameReport};
 use foldfront::oracle::Oracle;
+use foldfront::page_store::Simulated;
 use foldfront::refine::Strategy;
-use foldfront::vertex_tree::simulated::Simulated;
 use foldfront::vertex_tree::{Hierarchy, NodeId, NullSink, Prefetch};
 use foldfront::view::View;
 use meta_node::{InUse, Io, MetaNodeFile, MetaNodeTree};

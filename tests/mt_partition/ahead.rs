@@ -7,8 +7,8 @@ use std::time::Duration;
 
 use foldfront::Hierarchy;
 use foldfront::engine::{Engine, FrameReport, Settings};
+use foldfront::page_store::Simulated;
 use foldfront::refine::Strategy;
-use foldfront::vertex_tree::simulated::Simulated;
 use foldfront::vertex_tree::{NodeId, NullSink, Prefetch};
 use foldfront::view::View;
 use glam::DVec3;

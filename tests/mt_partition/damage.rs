@@ -1,12 +1,18 @@
 //! Files that are damaged, cut short or something else.
 
 use std::sync::Arc;
+use std::time::Duration;
 
 use foldfront::Hierarchy;
-use foldfront::vertex_tree::source::MemorySource;
-use mt_partition::{BuildOptions, FileError, MAGIC, MtError, MtFile};
+use foldfront::page_store::Simulated;
+use foldfront::page_store::source::MemorySource;
+use mt_partition::{
+    BuildOptions, CacheMode, FileError, MAGIC, Memory, MtError, MtFile, MtTree, Reader, Settings,
+};
 
+use crate::common::Random;
 use crate::common::sink::StrictMesh;
+use crate::lies::{Outcome, follow, put, section, tell_lies, word};
 use crate::{all_around, ball_log, finest};
 
 /// A small file with several partitions, and where its nodes start.
@@ -101,6 +107,72 @@ fn huge_counts_are_refused() {
             }
         }
     }
+}
+
+/// Where the records of the nodes are in an intact file.
+fn records(bytes: &[u8]) -> Vec<(usize, usize)> {
+    let ((mut start, _), (table, length)) = (section(bytes, 160, b"PAGE"), section(bytes, 160, b"NODE"));
+    let lengths = (0..length / 8).map(|node| word(bytes, table + 8 * node) as usize);
+    let place = |length| {
+        start += length;
+        (start - length, length)
+    };
+    lengths.map(place).collect()
+}
+
+#[test]
+fn nodes_that_lie_are_faults() {
+    let bytes = small();
+    let records = records(&bytes);
+    let (mut found, mut faults, mut opened) = (0, 0, 0);
+    for seed in 0..400 {
+        let mut lying = bytes.clone();
+        tell_lies(&mut lying, &records, &mut Random(seed));
+        let Ok(file) = open(lying) else { continue };
+        opened += 1;
+        found += u32::from(file.verify().is_err());
+        let store = Simulated::with_latency(Duration::from_millis(5));
+        let cache = CacheMode::ALL[seed as usize % CacheMode::ALL.len()];
+        let memory = Memory::new(if seed % 2 == 0 { u64::MAX } else { 2 * file.least_memory() });
+        let reader = Some(Reader::simulated(store));
+        let settings = Settings { cache, memory, reader, ..Settings::default() };
+        let Ok(tree) = MtTree::new(Arc::new(file), settings) else { continue };
+        let outcome = follow(tree, seed, 2000);
+        assert_eq!(outcome.errors, 0, "seed {seed}");
+        faults += u32::from(outcome.faults > 0);
+    }
+    assert!(opened > 390 && found > 250 && faults > 200, "{opened} opened, {found} found, {faults} faults");
+}
+
+/// One end of an arc says nothing of the other, whichever of the two comes first.
+#[test]
+fn arcs_with_one_end_are_faults() {
+    let bytes = small();
+    let records = records(&bytes);
+    // Ingoing arcs are at 52, outgoing ones behind them.
+    let (mut above, mut below) = (0, 0);
+    for (node, &(start, length)) in (0_u32..).zip(&records) {
+        let ingoing = word(&bytes, start + 32) as usize;
+        for (at, is_above) in [(start + 52, true), (start + 52 + 8 * ingoing, false)] {
+            let other = word(&bytes, at);
+            if other == u32::MAX || (other as usize) >= records.len() {
+                continue;
+            }
+            let mut lying = bytes.clone();
+            put(&mut lying, at, (0..).find(|&n| n != node && n != other).unwrap());
+            let sum = crc32fast::hash(&lying[start + 4..start + length]);
+            put(&mut lying, start, sum);
+            let file = open(lying).unwrap();
+            assert!(file.verify().is_err());
+            let reader = Some(Reader::simulated(Simulated::with_latency(Duration::from_millis(5))));
+            let tree = MtTree::new(Arc::new(file), Settings { reader, ..Settings::default() }).unwrap();
+            let Outcome { errors, faults } = follow(tree, 1, 2000);
+            assert_eq!(errors, 0);
+            assert!(faults > 0, "node {node}: an arc {}", if is_above { "above" } else { "below" });
+            *(if is_above { &mut above } else { &mut below }) += 1;
+        }
+    }
+    assert!(above > 20 && below > 10, "{above}, {below}");
 }
 
 #[test]

@@ -6,6 +6,8 @@ mod ahead;
 #[path = "../common/mod.rs"]
 mod common;
 mod damage;
+#[path = "../checks/lies.rs"]
+mod lies;
 mod paging;
 #[path = "../checks/patches.rs"]
 mod patches;

@@ -4,7 +4,7 @@ use std::sync::Arc;
 use std::time::{Duration, Instant};
 
 use foldfront::engine::Engine;
-use foldfront::vertex_tree::source::{Counted, Faults, Faulty, MemorySource, PageSource};
+use foldfront::page_store::source::{Counted, Faults, Faulty, MemorySource, PageSource};
 use foldfront::vertex_tree::{MeshSink, NullSink};
 use foldfront::{Hierarchy, engine::Settings};
 use mt_partition::{BuildOptions, CacheMode, Memory, MtError, MtFile, MtTree, Reader};

@@ -4,10 +4,11 @@ use std::path::Path;
 use std::sync::Arc;
 use std::sync::atomic::AtomicBool;
 
-use foldfront::vertex_tree::source::MemorySource;
+use foldfront::page_store::source::MemorySource;
 use foldfront::{CollapseLog, Hierarchy};
 use mt_partition::{
-    BuildOptions, CacheMode, Memory, MtError, MtFile, Workspace, WorkspaceError, WriteReport, write_within,
+    BuildOptions, CacheMode, FileError, Memory, MtError, MtFile, Workspace, WorkspaceError, WriteReport,
+    write_within,
 };
 
 use crate::common::data;
@@ -104,7 +105,10 @@ fn what_goes_wrong_is_said_and_leaves_nothing() {
         "{outcome:?}"
     );
     let outcome = write_within(Path::new("/nowhere/within.mt"), &log, &options, &workspace(".", &stop));
-    assert!(matches!(&outcome, Err(MtError::Io { file, .. }) if file == "/nowhere/within.mt"), "{outcome:?}");
+    assert!(
+        matches!(&outcome, Err(MtError::File(FileError::Write { file, .. })) if file == "/nowhere/within.mt"),
+        "{outcome:?}"
+    );
     let refused = |change: &dyn Fn(&mut CollapseLog)| {
         let mut log = log.clone();
         change(&mut log);

@@ -1,11 +1,36 @@
 //! What can be wrong with a file of any format.
 
+use std::io;
+use std::path::Path;
+
+use page_store::source::PageSource;
+
 use crate::error::SectionError;
 
 /// What can be wrong with a file before it is known what is in it.
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
 pub enum FileError {
+    /// Reading failed: the operating system or the store said no.
+    #[error("{file}: reading {length} bytes at offset {offset}: {source}")]
+    Read {
+        /// The file or store.
+        file: String,
+        /// Where, in bytes from the start.
+        offset: u64,
+        /// How much.
+        length: u64,
+        /// Why.
+        source: io::Error,
+    },
+    /// Writing failed.
+    #[error("{file}: {source}")]
+    Write {
+        /// The file.
+        file: String,
+        /// Why.
+        source: io::Error,
+    },
     /// The file is something else.
     #[error("{file}: {what}: it does not start with \"{magic}\"")]
     Foreign {
@@ -65,13 +90,34 @@ pub enum FileError {
 }
 
 impl FileError {
+    /// Writing a file failed.
+    #[must_use]
+    pub fn write(path: &Path, source: io::Error) -> Self {
+        Self::Write { file: path.display().to_string(), source }
+    }
+
     /// What is wrong with the sections of a file, under the name that it has always had.
     #[must_use]
     pub fn of_sections(file: &str, error: SectionError) -> Self {
         let file = file.to_owned();
         match error {
+            SectionError::Io { offset, length, source } => Self::Read { file, offset, length, source },
             SectionError::FileLength { expected, actual } => Self::Length { file, expected, actual },
             source => Self::Sections { file, source },
         }
     }
+}
+
+/// Fills a buffer with the bytes of a store from an offset on.
+///
+/// # Errors
+/// [`FileError::Read`].
+pub fn read_at(source: &dyn PageSource, offset: u64, buffer: &mut [u8]) -> Result<(), FileError> {
+    let length = buffer.len() as u64;
+    source.read_at(offset, buffer).map_err(|error| FileError::Read {
+        file: source.name().to_owned(),
+        offset,
+        length,
+        source: error,
+    })
 }

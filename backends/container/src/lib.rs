@@ -49,7 +49,7 @@ mod table;
 mod writer;
 
 pub use error::SectionError;
-pub use file_error::FileError;
+pub use file_error::{FileError, read_at};
 pub use georeference::{DegreeMap, Georeference, Rounding};
 pub use layout::MOST;
 pub use section::{BY_PAGE, Extra, Kind, NECESSARY, Section};

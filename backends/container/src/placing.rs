@@ -17,7 +17,7 @@
 
 use std::io;
 
-use vertex_tree::source::PageSource;
+use page_store::source::PageSource;
 
 use crate::error::SectionError;
 use crate::georeference::{DegreeMap, Georeference, Rounding};

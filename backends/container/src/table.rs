@@ -2,7 +2,7 @@
 
 use std::io;
 
-use vertex_tree::source::PageSource;
+use page_store::source::PageSource;
 
 use crate::error::SectionError;
 use crate::layout::{self, ENTRY, MOST, START, aligned};

@@ -6,8 +6,8 @@ use container::{
     BY_PAGE, Extra, Georeference, Kind, MOST, NECESSARY, Section, SectionError, SectionWriter, Sections,
     file_length,
 };
+use page_store::source::MemorySource;
 use proptest::prelude::*;
-use vertex_tree::source::MemorySource;
 
 const HEADER: &[u8] = b"a header of 44 bytes, which is checked alone";
 const OWN: [(Kind, u32); 3] = [(Kind::POSITIONS, 0), (Kind::PAGES, BY_PAGE), (Kind::NODES, 0)];

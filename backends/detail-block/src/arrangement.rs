@@ -51,7 +51,7 @@ impl Arrangement {
     /// Writes the file: to a temporary name, synced, then renamed.
     ///
     /// # Errors
-    /// [`XfmError::Write`]; nothing is left behind then.
+    /// [`FileError::Write`](container::FileError::Write); nothing is left behind then.
     pub fn write(&self, path: &Path) -> Result<WriteReport, XfmError> {
         self.arranged.borrow_mut().write(path, &Memory).map_err(|f| f.into_error(Path::new(""), path))
     }

@@ -5,7 +5,9 @@ use std::path::Path;
 
 use collapse_log::LogError;
 use collapse_log::external::WorkspaceError;
-use container::{FileError, SectionError};
+use container::FileError;
+use page_store::ThreadError;
+use vertex_tree::TreeError;
 
 /// An XFM file could not be written or is not what it should be.
 #[derive(Debug, thiserror::Error)]
@@ -44,32 +46,15 @@ pub enum XfmError {
         /// As computed.
         length: f32,
     },
-    /// Writing failed.
-    #[error("{file}: {source}")]
-    Write {
-        /// The file.
-        file: String,
-        /// Why.
-        source: io::Error,
-    },
     /// The log that a file was to be built from can not be read.
     #[error("reading the collapse log: {source}")]
     Source {
         /// Why.
         source: io::Error,
     },
-    /// Reading failed.
-    #[error("{file}: reading {length} bytes at offset {offset}: {source}")]
-    Read {
-        /// The file or store.
-        file: String,
-        /// Where, in bytes from the start.
-        offset: u64,
-        /// How much.
-        length: u64,
-        /// Why.
-        source: io::Error,
-    },
+    /// The thread that reads could not be started.
+    #[error(transparent)]
+    Thread(#[from] ThreadError),
     /// A field of the header or of a table has a value that it can not have.
     #[error("{file}: offset {offset}: {field} is {value}, {expected}")]
     Field {
@@ -110,18 +95,6 @@ pub enum XfmError {
     },
 }
 
-impl XfmError {
-    /// What is wrong with the sections of a file, under the name that it has always had.
-    pub(crate) fn of_sections(file: &str, error: SectionError) -> Self {
-        match error {
-            SectionError::Io { offset, length, source } => {
-                Self::Read { file: file.to_owned(), offset, length, source }
-            }
-            error => FileError::of_sections(file, error).into(),
-        }
-    }
-}
-
 /// What goes wrong in a construction, before it is known what is called how.
 #[derive(Debug)]
 pub(crate) enum Failure {
@@ -158,8 +131,21 @@ impl Failure {
         match self {
             Self::Temporary(source) => WorkspaceError::Temporary { folder: folder.to_owned(), source }.into(),
             Self::Source(source) => XfmError::Source { source },
-            Self::Output(source) => XfmError::Write { file: file.display().to_string(), source },
+            Self::Output(source) => FileError::write(file, source).into(),
             Self::Other(error) => error,
         }
+    }
+}
+
+/// An error of the file as one of the tree.
+pub(crate) fn tree_error(error: XfmError) -> TreeError {
+    match error {
+        XfmError::File(FileError::Read { file, offset, length, source }) => {
+            TreeError::Read { file, offset, length: length as usize, source }
+        }
+        XfmError::Block { file, offset, reason, .. } | XfmError::Node { file, offset, reason, .. } => {
+            TreeError::Damaged { file, offset, reason }
+        }
+        other => TreeError::Store(other.into()),
     }
 }

@@ -3,8 +3,8 @@
 use std::path::Path;
 use std::sync::Arc;
 
-use container::{Georeference, Sections};
-use vertex_tree::source::{FileSource, MappedSource, PageSource};
+use container::{FileError, Georeference, Sections, read_at};
+use page_store::source::{FileSource, MappedSource, PageSource};
 use vertex_tree::{Bounds, NodeId};
 
 use crate::block::{Block, resident_bytes};
@@ -74,7 +74,7 @@ impl XfmFile {
     )]
     pub unsafe fn open_mapped(path: &Path) -> Result<Self, XfmError> {
         let file = path.display().to_string();
-        let read = |source| XfmError::Read { file: file.clone(), offset: 0, length: 0, source };
+        let read = |source| FileError::Read { file: file.clone(), offset: 0, length: 0, source };
         // SAFETY: that the file stays as it is has been promised by the caller.
         let map = unsafe { MappedSource::open(path) }.map_err(read)?;
         Self::with_index(Arc::new(FileSource::open(path).map_err(read)?), Some(map))
@@ -226,8 +226,8 @@ impl XfmFile {
 
     /// Compares the checksums of what this version does not know.
     pub(crate) fn verify_unknown(&self) -> Result<(), XfmError> {
-        let error = |error| XfmError::of_sections(self.name(), error);
-        self.sections.verify_unknown(&*self.source).map_err(error)
+        let error = |error| FileError::of_sections(self.name(), error);
+        Ok(self.sections.verify_unknown(&*self.source).map_err(error)?)
     }
 
     pub(crate) fn header(&self) -> &Header {
@@ -288,12 +288,7 @@ impl XfmFile {
     pub(crate) fn read_block(&self, block: u32, bytes: &mut Vec<u8>) -> Result<Block, XfmError> {
         let (offset, length) = self.place(block);
         bytes.resize(length as usize, 0);
-        self.source.read_at(offset, bytes).map_err(|source| XfmError::Read {
-            file: self.name().to_owned(),
-            offset,
-            length,
-            source,
-        })?;
+        read_at(&*self.source, offset, bytes)?;
         Block::decode(&self.header, block, bytes).map_err(|reason| self.damaged(block, reason))
     }
 

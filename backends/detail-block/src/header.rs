@@ -1,7 +1,7 @@
 //! Reading the header.
 
-use container::FileError;
-use vertex_tree::source::PageSource;
+use container::{FileError, read_at};
+use page_store::source::PageSource;
 
 use crate::error::XfmError;
 use crate::format::{FLAG_NESTED, FLAG_QUANTISED, HEADER_BYTES, Header, MAGIC, VERSION};
@@ -13,22 +13,12 @@ pub(crate) fn long(bytes: &[u8]) -> u64 {
     bytes.iter().rev().fold(0, |value, &byte| value << 8 | u64::from(byte))
 }
 
-pub(crate) fn read(source: &dyn PageSource, offset: u64, bytes: &mut [u8]) -> Result<(), XfmError> {
-    let length = bytes.len() as u64;
-    source.read_at(offset, bytes).map_err(|e| XfmError::Read {
-        file: source.name().to_owned(),
-        offset,
-        length,
-        source: e,
-    })
-}
-
 /// Reads the header and checks its numbers. Whether what they count has its place in the file is found with the tables.
 pub(crate) fn read_header(source: &dyn PageSource) -> Result<Header, XfmError> {
     let file = || source.name().to_owned();
     let actual = source.len();
     let mut bytes = vec![0; HEADER_BYTES.min(actual) as usize];
-    read(source, 0, &mut bytes)?;
+    read_at(source, 0, &mut bytes)?;
     if !bytes.starts_with(&MAGIC) {
         return Err(FileError::Foreign { file: file(), what: "not an XFM file", magic: "FFXFMESH" }.into());
     }

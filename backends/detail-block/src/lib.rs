@@ -5,7 +5,7 @@
 //! ```
 //! # use std::sync::Arc;
 //! # use detail_block::{BuildOptions, Settings, XfmFile, XfmTree};
-//! # use vertex_tree::source::FileSource;
+//! # use page_store::source::FileSource;
 //! # use collapse_log::CollapseLog;
 //! # use vertex_tree::{NullSink, Hierarchy, VertexTree};
 //! # fn main() -> Result<(), Box<dyn std::error::Error>> {
@@ -27,6 +27,7 @@
 mod arrange;
 mod arrangement;
 mod block;
+mod blocks;
 mod build;
 mod cone;
 mod error;
@@ -36,7 +37,6 @@ mod format;
 mod half_edges;
 mod header;
 mod layout;
-mod loader;
 mod nesting;
 mod node;
 mod numbering;
@@ -46,12 +46,12 @@ mod quantize;
 mod removal;
 mod renumber;
 mod replay;
-mod requests;
 mod returns;
 mod settings;
 mod shown;
 mod step;
 mod storage;
+mod stored;
 mod surface;
 mod tables;
 mod tree;
@@ -69,6 +69,7 @@ pub use error::XfmError;
 pub use file::XfmFile;
 pub use format::MAGIC;
 pub use options::{BuildOptions, WriteReport};
-pub use paging::{ATTEMPTS, PagingCounts, SOON};
+pub use paging::{ATTEMPTS, PagingCounts};
+pub use returns::SOON;
 pub use settings::{Io, Settings};
 pub use tree::XfmTree;

@@ -1,8 +1,4 @@
-//! Which blocks are in memory: the directory, loading, the two quotas and removal (section 4 of the paper).
-//!
-//! The directory holds a number for each block, of where it is among the loaded ones. A block is a candidate for removal
-//! when none of its nodes is active and the sibling of its root is folded too; then it is stamped with the frame and put
-//! at the end of a queue. Whether it still is a candidate is looked at when it comes to the front of the queue.
+//! Which blocks are in memory: loading and the two quotas (section 4 of the paper).
 //!
 //! * Beyond the **soft quota**, candidates are removed at the end of each frame, the least recently used first, once they
 //!   have been candidates for some frames and are not expected back (see [`returns`](crate::returns)), and only if the
@@ -16,42 +12,33 @@
 //! change that wants a block is refused, and the block is asked for, so that no frame waits; that is the only difference between
 //! the paper's scheme and [`Prefetch::Paper`](vertex_tree::Prefetch::Paper). Whoever wants it as printed waits for
 //! [`settle`](vertex_tree::Hierarchy::settle) and asks again, as foldfront's `Settled` does (`--prefetch blocking`);
-//! [`Io::Blocking`](crate::Io::Blocking) reads within the change itself.
+//! [`Io::Blocking`](crate::Io::Blocking) reads within the change itself: a store without latency, whose answer is taken at once.
 //!
-//! Blocks of active nodes are never removed, so whatever is active can be asked about. A root of a block that is in play
-//! but removed leaves behind its sphere, error and parent: a [`Stub`].
+//! Blocks of active nodes are never removed, so whatever is active can be asked about.
 
-use std::collections::VecDeque;
 use std::ops::Range;
 use std::sync::Arc;
-use std::time::Duration;
+use std::time::{Duration, Instant};
 
+use page_store::{Arrival, Failures, NOW as URGENT, Requests, Simulated, Store, ThreadError, Ticket};
 use rustc_hash::FxHashMap;
-use slab::Slab;
-use vertex_tree::{Bounds, LookAhead, NONE, NodeId, PageStats, TreeError};
+use vertex_tree::{NodeId, PageStats, TreeError};
 
-use crate::block::{Block, Node, resident_bytes};
-use crate::error::XfmError;
+use crate::block::{Block, resident_bytes};
+use crate::blocks::Blocks;
+use crate::error::{XfmError, tree_error};
 use crate::file::XfmFile;
 use crate::foresight::Foresight;
-use crate::loader::{Answer, Loader};
-use crate::requests::tree_error;
-use crate::returns::Returns;
-use crate::settings::Settings;
-use crate::waiting::Waiting;
+use crate::removal::{Keepers, NOW, Removal};
+use crate::settings::{Io, Settings};
+use crate::stored::{Run, Stored};
+use crate::waiting::{Wait, Waiting};
 
 /// How many times in a row reading a block may fail before that is an error of the tree.
 pub const ATTEMPTS: u32 = 16;
 
-/// A block that is read again within so many frames of its removal counts as removed too soon.
-pub const SOON: u64 = 60;
-
-/// What a removed block's root in play is still asked about.
-#[derive(Clone, Copy, Debug)]
-pub(crate) struct Stub {
-    pub bounds: Bounds,
-    pub parent: u32,
-}
+/// Frames of foresight, at least.
+const LEAST: u32 = 2;
 
 /// What paging has done since the tree was made.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -62,7 +49,7 @@ pub struct PagingCounts {
     pub ahead: u64,
     /// Blocks removed.
     pub removals: u64,
-    /// Blocks loaded again within [`SOON`] frames of their removal.
+    /// Blocks loaded again within [`SOON`](crate::SOON) frames of their removal.
     pub soon_again: u64,
     /// Requests refused because of the hard quota.
     pub refused: u64,
@@ -73,133 +60,62 @@ pub struct PagingCounts {
 }
 
 /// A block that has been asked for.
-pub(crate) struct Pending {
-    pub waiting: Vec<NodeId>,
-    /// Whether no change has missed it.
-    pub is_ahead: bool,
+struct Pending {
+    run: Run,
+    ticket: Ticket,
+    waiting: Vec<NodeId>,
 }
 
 pub(crate) struct Paging {
-    pub file: Arc<XfmFile>,
-    pub directory: Vec<u32>,
-    pub loaded: Slab<Block>,
-    pub bytes: u64,
+    pub blocks: Blocks,
     /// Bytes of blocks under way.
     pub reserved: u64,
-    /// Out of play, and in play; each with its stamp, ascending.
-    pub candidates: [VecDeque<(u64, u32)>; 2],
-    pub stubs: FxHashMap<u32, Stub>,
-    pub pending: FxHashMap<u32, Pending>,
+    pending: FxHashMap<u32, Pending>,
+    requests: Requests<Stored>,
+    /// Whether a change waits for what it asks for.
+    is_blocking: bool,
     pub waiting: Waiting,
-    pub failures: FxHashMap<u32, u32>,
-    /// When blocks were removed lately, and had left play.
-    pub removed_at: FxHashMap<u32, (u64, u64)>,
-    pub removed: VecDeque<(u64, u32)>,
-    /// `None` where loading blocks.
-    pub loader: Option<Loader>,
-    pub foresight: Foresight,
-    /// What is known of the store.
-    pub store: LookAhead,
-    pub returns: Returns,
+    failures: Failures<u32>,
+    foresight: Foresight,
+    removal: Removal,
     pub soft: u64,
     pub hard: u64,
-    pub grace: u64,
-    pub frame: u64,
-    pub stats: PageStats,
+    frame: u64,
+    stats: PageStats,
     pub counts: PagingCounts,
-    answers: Vec<Answer>,
-    pub buffer: Vec<u8>,
-    pub error: Option<XfmError>,
+    error: Option<XfmError>,
+    /// Kept for their allocations.
+    arrivals: Vec<Arrival<Stored>>,
+    withdrawn: Vec<Run>,
 }
 
 impl Paging {
-    pub fn new(file: Arc<XfmFile>, loader: Option<Loader>, settings: &Settings) -> Self {
-        Self {
-            directory: vec![NONE; file.header().blocks as usize],
-            file,
-            loaded: Slab::new(),
-            bytes: 0,
+    pub fn new(file: Arc<XfmFile>, settings: &Settings) -> Result<Self, ThreadError> {
+        let at_once = Simulated { latency: Duration::ZERO, bandwidth: None, depth: 1 };
+        let store = match settings.io {
+            Io::Blocking => Store::simulated(at_once),
+            Io::Simulated(store) => Store::simulated(store),
+            Io::Background => Store::new()?,
+        };
+        Ok(Self {
+            requests: Requests::new(store, Arc::new(Stored(file.clone()))),
+            blocks: Blocks::new(file),
             reserved: 0,
-            candidates: Default::default(),
-            stubs: FxHashMap::default(),
             pending: FxHashMap::default(),
+            is_blocking: settings.io == Io::Blocking,
             waiting: Waiting::default(),
-            failures: FxHashMap::default(),
-            removed_at: FxHashMap::default(),
-            removed: VecDeque::new(),
-            loader,
+            // What a change misses is asked for in every frame: it is an error of the tree soon enough.
+            failures: Failures::new(0),
             foresight: Foresight::default(),
-            store: LookAhead::default(),
-            returns: Returns::default(),
+            removal: Removal::new(settings.grace.into()),
             soft: settings.soft_quota,
             hard: settings.hard_quota,
-            grace: settings.grace.into(),
             frame: 0,
             stats: PageStats::default(),
             counts: PagingCounts::default(),
-            answers: Vec::new(),
-            buffer: Vec::new(),
             error: None,
-        }
-    }
-
-    /// A block, if it is loaded.
-    #[inline(always)]
-    pub fn block(&self, number: u32) -> Option<&Block> {
-        match *self.directory.get(number as usize)? {
-            NONE => None,
-            slot => Some(&self.loaded[slot as usize]),
-        }
-    }
-
-    #[inline(always)]
-    pub fn block_mut(&mut self, number: u32) -> Option<&mut Block> {
-        match *self.directory.get(number as usize)? {
-            NONE => None,
-            slot => Some(&mut self.loaded[slot as usize]),
-        }
-    }
-
-    pub fn blocks(&self) -> impl Iterator<Item = &Block> {
-        self.loaded.iter().map(|(_, block)| block)
-    }
-
-    /// A node, if its block is loaded and it is there.
-    #[inline(always)]
-    pub fn node(&self, node: NodeId) -> Option<&Node> {
-        let levels = self.file.levels();
-        let block = self.block(levels.block(node))?;
-        Some(&block.nodes[block.index_of(levels.offset(node))?])
-    }
-
-    #[inline(always)]
-    pub fn node_mut(&mut self, node: NodeId) -> Option<&mut Node> {
-        let levels = self.file.levels();
-        let block = self.block_mut(levels.block(node))?;
-        let index = block.index_of(levels.offset(node))?;
-        Some(&mut block.nodes[index])
-    }
-
-    #[inline(always)]
-    pub fn is_active(&self, node: NodeId) -> bool {
-        self.node(node).is_some_and(Node::is_active)
-    }
-
-    pub fn stub(&self, block: u32) -> Option<&Stub> {
-        self.stubs.get(&block)
-    }
-
-    /// The child blocks of a node of the lowest level, empty for any other; `None` if its own block is not loaded.
-    #[inline]
-    pub fn child_blocks(&self, node: NodeId) -> Option<Range<u32>> {
-        let levels = self.file.levels();
-        let block = self.block(levels.block(node))?;
-        let Some(i) = levels.offset(node).checked_sub(levels.lowest()) else { return Some(0..0) };
-        let [left, right] = [block.child_block(2 * i), block.child_block(2 * i + 1)];
-        Some(match (left, right) {
-            (Some(first), Some(_)) => first..first + 2,
-            (Some(only), None) | (None, Some(only)) => only..only + 1,
-            (None, None) => 0..0,
+            arrivals: Vec::new(),
+            withdrawn: Vec::new(),
         })
     }
 
@@ -207,63 +123,338 @@ impl Paging {
     #[inline(always)]
     pub fn use_block(&mut self, number: u32) {
         let frame = self.frame;
-        if let Some(block) = self.block_mut(number) {
+        if let Some(block) = self.blocks.block_mut(number) {
             block.used = frame;
             let left = std::mem::take(&mut block.left);
             if std::mem::take(&mut block.is_unused) {
                 self.stats.ahead_used += 1;
             }
-            if left != 0 {
-                self.returns.back(left);
+            self.removal.back(left);
+        }
+    }
+
+    // Asking for blocks.
+
+    /// Asks for blocks that a change of `node` takes, at most two. Says whether they are loaded, which they may be at
+    /// once only where loading blocks.
+    pub fn demand(&mut self, blocks: Range<u32>, node: NodeId) -> bool {
+        let (mut missing, mut waits) = (Run { first: 0, count: 0 }, false);
+        for number in blocks.clone() {
+            if self.blocks.block(number).is_some() {
+                self.use_block(number);
+            } else if let Some(pending) = self.pending.get_mut(&number) {
+                waits = true;
+                pending.waiting.push(node);
+                self.requests.demand(pending.ticket);
+            } else {
+                missing = match missing.count {
+                    0 => Run { first: number, count: 1 },
+                    count => Run { first: missing.first, count: count + 1 },
+                };
+            }
+        }
+        if waits {
+            self.waiting.wait(node, blocks.clone());
+        }
+        if missing.count == 0 {
+            return !waits;
+        }
+        if !self.make_room(self.bytes_of(missing), NOW) {
+            self.counts.refused += 1;
+            self.stats.no_room += 1;
+            self.waiting.again.push(node);
+            return false;
+        }
+        self.ask(missing, Some(node));
+        if self.is_blocking {
+            return self.read_now(missing) && !waits;
+        }
+        self.waiting.wait(node, blocks);
+        false
+    }
+
+    /// Bytes of memory that blocks take.
+    fn bytes_of(&self, run: Run) -> u64 {
+        run.numbers().map(|b| resident_bytes(self.blocks.file.nodes_in(b))).sum()
+    }
+
+    /// Asks for a run, for which there is room: for a node, or ahead of time.
+    fn ask(&mut self, run: Run, node: Option<NodeId>) {
+        self.reserved += self.bytes_of(run);
+        self.counts.peak_bytes = self.counts.peak_bytes.max(self.blocks.bytes + self.reserved);
+        let ticket = self.requests.ask(run, if node.is_some() { URGENT } else { URGENT + 1 });
+        for number in run.numbers() {
+            self.pending.insert(number, Pending { run, ticket, waiting: node.into_iter().collect() });
+        }
+    }
+
+    /// Reads a run that has been asked for, where loading blocks. Says whether all of it is there.
+    fn read_now(&mut self, run: Run) -> bool {
+        let start = Instant::now();
+        self.requests.settle();
+        let mut arrivals = std::mem::take(&mut self.arrivals);
+        self.requests.take(&mut arrivals);
+        // What asked goes on at once, or is refused and asks again in the next frame.
+        let mut arrived = Vec::new();
+        for arrival in arrivals.drain(..) {
+            self.integrate(arrival, &mut arrived);
+        }
+        self.arrivals = arrivals;
+        let is_there = run.numbers().all(|number| self.blocks.block(number).is_some());
+        if !is_there {
+            self.waiting.again.append(&mut arrived);
+        }
+        self.counts.blocked += start.elapsed();
+        is_there
+    }
+
+    /// Takes a run into the directory.
+    fn integrate(&mut self, arrival: Arrival<Stored>, arrived: &mut Vec<NodeId>) {
+        let Arrival { read: run, is_demanded, content } = arrival;
+        self.reserved -= self.bytes_of(run);
+        for number in run.numbers() {
+            let Some(pending) = self.pending.remove(&number) else { continue };
+            pending.waiting.iter().for_each(|&node| self.stop_waiting(node));
+            arrived.extend(pending.waiting);
+        }
+        let blocks = match content {
+            Ok(blocks) => blocks,
+            // One failed read is one fault, whatever it was to bring, and has been counted.
+            Err(error) => return self.failed(run.first, error, is_demanded),
+        };
+        for (number, block) in run.numbers().zip(blocks) {
+            let check = |block: Block| match self.blocks.check_links(&block) {
+                Ok(()) => Ok(block),
+                Err(reason) => Err(self.blocks.file.damaged(number, reason)),
+            };
+            match block.and_then(check) {
+                Ok(mut block) => {
+                    // A read that came ahead of time is used when its first block is.
+                    block.is_unused = !is_demanded && number == run.first;
+                    self.counts.ahead += u64::from(!is_demanded);
+                    self.insert(block);
+                }
+                Err(error) => {
+                    self.stats.faults += 1;
+                    self.failed(number, error, is_demanded);
+                }
             }
         }
     }
 
-    pub fn insert(&mut self, mut block: Block) {
+    fn insert(&mut self, mut block: Block) {
         let number = block.number;
-        self.failures.remove(&number);
-        self.stubs.remove(&number);
+        self.failures.forget(number);
         block.used = self.frame;
-        self.bytes += resident_bytes(block.nodes.len() as u32);
-        self.directory[number as usize] = self.loaded.insert(block) as u32;
+        self.blocks.insert(block);
         self.counts.loads += 1;
-        if let Some(&(at, left)) = self.removed_at.get(&number)
-            && self.frame - at <= SOON
-        {
-            self.counts.soon_again += 1;
-            self.returns.back(left);
-        }
+        self.counts.soon_again += u64::from(self.removal.came(number));
         self.may_go(number);
     }
 
-    pub fn begin_frame(&mut self, arrived: &mut Vec<NodeId>) -> Result<(), TreeError> {
-        self.frame += 1;
-        arrived.append(&mut self.waiting.again);
-        if let Some(loader) = &mut self.loader {
-            let mut answers = std::mem::take(&mut self.answers);
-            loader.take(self.frame, &mut answers);
-            self.store.begin_frame(answers.len(), loader.waiting().iter().sum());
-            for answer in answers.drain(..) {
-                self.integrate(answer, arrived);
-            }
-            self.answers = answers;
+    /// Reading a block has failed. That it was only foreseen is no error of the tree: it is left alone until it is missed.
+    fn failed(&mut self, number: u32, error: XfmError, is_demanded: bool) {
+        if !is_demanded {
+            self.failures.suspect(number);
+        } else if self.failures.failed(number, self.frame) >= ATTEMPTS {
+            self.failures.forget(number);
+            self.error = Some(error);
         }
-        self.take_error()
     }
 
     pub fn take_error(&mut self) -> Result<(), TreeError> {
         self.error.take().map_or(Ok(()), |error| Err(tree_error(error)))
     }
 
+    // Changes that wait.
+
+    /// A change that waits has made use of blocks: see [`Waiting::pin_for`].
+    pub fn pin_for(&mut self, node: NodeId, needed: Option<NodeId>) {
+        self.waiting.pin_for(node, needed, &self.blocks);
+    }
+
+    /// A change does not wait any more: it asks again, or is to.
+    pub fn stop_waiting(&mut self, node: NodeId) {
+        let Some(Wait { blocks, pinned }) = self.waiting.stop(node) else { return };
+        pinned.into_iter().for_each(|number| self.use_block(number));
+        for number in blocks {
+            if let Some(pending) = self.pending.get_mut(&number) {
+                pending.waiting.retain(|&other| other != node);
+            }
+        }
+    }
+
+    /// A change that was refused is not wanted any more.
+    pub fn give_up(&mut self, node: NodeId) {
+        self.waiting.again.retain(|&other| other != node);
+        let Some(blocks) = self.waiting.waits_for(node) else { return };
+        self.stop_waiting(node);
+        for number in blocks {
+            let Some(&Pending { run, ticket, .. }) = self.pending.get(&number) else { continue };
+            let is_unwanted =
+                |number: u32| self.pending.get(&number).is_some_and(|pending| pending.waiting.is_empty());
+            if run.numbers().all(is_unwanted) && self.requests.withdraw(ticket) {
+                self.withdrawn(run);
+            }
+        }
+    }
+
+    // Foresight.
+
+    /// For how many frames ahead it is worth to know what will be needed.
+    pub fn look_ahead(&self) -> u32 {
+        self.requests.look_ahead(LEAST)
+    }
+
+    /// A node is expected to change in so many frames.
+    pub fn foresee(&mut self, node: NodeId, frames: u32) {
+        self.foresight.foresee(node, frames, &self.blocks);
+    }
+
+    /// Takes back what was asked for ahead of time and has not been started. Says whether there was any.
+    fn withdraw(&mut self) -> bool {
+        let mut runs = std::mem::take(&mut self.withdrawn);
+        self.requests.withdraw_ahead(&mut runs);
+        let is_any = !runs.is_empty();
+        runs.drain(..).for_each(|run| self.withdrawn(run));
+        self.withdrawn = runs;
+        is_any
+    }
+
+    /// A request has been taken back.
+    fn withdrawn(&mut self, run: Run) {
+        self.reserved -= self.bytes_of(run);
+        for number in run.numbers() {
+            self.pending.remove(&number);
+        }
+    }
+
+    /// Asks for what has been named in this frame, instead of what was before.
+    pub fn ask_for_foreseen(&mut self) {
+        self.withdraw();
+        self.foresight.end_frame();
+        let mut at = 0;
+        // Making room takes off the end.
+        while let Some((due, first)) = self.foresight.at(at) {
+            at += 1;
+            if !self.is_missing(first) {
+                continue;
+            }
+            // Siblings are named together and lie together.
+            let sibling = self.foresight.at(at) == Some((due, first + 1));
+            let count = if sibling && self.is_missing(first + 1) { 2 } else { 1 };
+            at += count as usize - 1;
+            let run = Run { first, count };
+            if !self.make_room(self.bytes_of(run), due) {
+                return;
+            }
+            self.ask(run, None);
+        }
+    }
+
+    /// Whether a block is neither there nor under way, and nothing is known to be wrong with it.
+    fn is_missing(&self, number: u32) -> bool {
+        self.blocks.block(number).is_none()
+            && !self.pending.contains_key(&number)
+            && !self.failures.holds(number)
+    }
+
+    // Making room.
+
+    /// A block may have become a candidate for removal.
+    pub fn may_go(&mut self, number: u32) {
+        self.removal.may_go(number, &mut self.blocks);
+    }
+
+    /// A node has been folded: its children are not in play any more.
+    pub fn leave_play(&mut self, node: NodeId) {
+        self.removal.leave_play(node, &mut self.blocks);
+    }
+
+    /// A candidate to make room below the hard quota for what is needed in so many frames: one that is foreseen if there is no
+    /// other.
+    fn any_candidate(&mut self, since: u64, due: u32) -> Option<u32> {
+        let Self { blocks, removal, waiting, foresight, .. } = self;
+        let keepers = Keepers { waiting, foresight, since };
+        if let Some(number) = removal.unforeseen(keepers, blocks) {
+            return Some(number);
+        }
+        while let Some(number) = foresight.farthest(due) {
+            if Removal::may_take(number, Keepers { waiting, foresight, since }, blocks) {
+                return Some(number);
+            }
+        }
+        None
+    }
+
+    fn remove(&mut self, number: u32) {
+        self.removal.remove(number, &mut self.blocks);
+        self.counts.removals += 1;
+    }
+
+    /// Makes room below the hard quota for so many bytes, which are needed in so many frames.
+    ///
+    /// What a change has made use of in the last frame stays, and what one that waits is going to make use of, so that what
+    /// has come for it is still there when the rest does. With a camera at rest a block that
+    /// has come for a change is thus not removed for another, and as every change that is made lets the front sink,
+    /// loading comes to an end, whatever the quota.
+    fn make_room(&mut self, bytes: u64, due: u32) -> bool {
+        let fits =
+            |paging: &Self| (paging.blocks.bytes + paging.reserved).saturating_add(bytes) <= paging.hard;
+        while !fits(self) {
+            // What has not been started takes no room from what is missed.
+            if due == NOW && self.withdraw() {
+                continue;
+            }
+            match self.any_candidate(self.frame.saturating_sub(1), due) {
+                Some(number) => self.remove(number),
+                None => return false,
+            }
+        }
+        true
+    }
+
+    // Frames.
+
+    pub fn begin_frame(&mut self, arrived: &mut Vec<NodeId>) -> Result<(), TreeError> {
+        self.frame += 1;
+        self.removal.begin_frame(self.frame);
+        arrived.append(&mut self.waiting.again);
+        let mut arrivals = std::mem::take(&mut self.arrivals);
+        self.requests.begin_frame(self.frame, &mut arrivals);
+        for arrival in arrivals.drain(..) {
+            self.integrate(arrival, arrived);
+        }
+        self.arrivals = arrivals;
+        self.take_error()
+    }
+
     /// Waits for all that is under way. It is taken at the start of the next frame. Returns how long that took.
     pub fn settle(&mut self) -> Duration {
-        self.loader.as_mut().map_or(Duration::ZERO, Loader::settle)
+        self.requests.settle()
     }
 
     /// Lets time pass, if it is virtual.
     pub fn pass(&mut self, time: Duration) {
-        if let Some(loader) = &mut self.loader {
-            loader.pass(time);
+        self.requests.pass(time);
+    }
+
+    /// Removes candidates beyond the quotas.
+    pub fn end_frame(&mut self) -> PageStats {
+        while self.blocks.bytes + self.reserved > self.hard
+            && let Some(number) = self.any_candidate(self.frame, NOW)
+        {
+            self.remove(number);
         }
+        while self.blocks.bytes > self.soft {
+            let Self { blocks, removal, waiting, foresight, .. } = self;
+            let keepers = Keepers { waiting, foresight, since: 0 };
+            let Some(number) = removal.beyond_soft(keepers, blocks) else { break };
+            self.remove(number);
+        }
+        self.removal.end_frame();
+        let resident_bytes = self.blocks.bytes + self.blocks.fixed_bytes();
+        let resident = PageStats { resident_bytes, ..PageStats::default() };
+        std::mem::take(&mut self.stats) + self.requests.take_stats() + resident
     }
 }

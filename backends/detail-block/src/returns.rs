@@ -12,7 +12,8 @@
 
 use std::collections::VecDeque;
 
-use crate::paging::SOON;
+/// A block that is read again within so many frames of its removal counts as removed too soon.
+pub const SOON: u64 = 60;
 
 /// Frames around a cohort that are looked at together, to either side.
 const AROUND: u64 = 5;

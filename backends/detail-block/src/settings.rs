@@ -1,7 +1,7 @@
 //! How a tree loads and how much it keeps.
 
+use page_store::Simulated;
 use vertex_tree::Prefetch;
-use vertex_tree::simulated::Simulated;
 
 /// What reads blocks, and what becomes of a frame meanwhile.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Default)]
@@ -11,7 +11,7 @@ pub enum Io {
     Background,
     /// The frame itself, as in the paper: it waits for the disk. Nothing is loaded ahead of time then.
     Blocking,
-    /// A store on virtual time, see [`vertex_tree::simulated`]. There is no thread, and frames do not wait.
+    /// A store on virtual time. There is no thread, and frames do not wait.
     Simulated(Simulated),
 }
 

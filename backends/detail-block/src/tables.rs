@@ -1,11 +1,11 @@
 //! Reading all that comes with the header: everything but the blocks.
 
-use container::{BY_PAGE, FileError, Georeference, Kind, SectionError, Sections};
-use vertex_tree::source::PageSource;
+use container::{BY_PAGE, FileError, Georeference, Kind, SectionError, Sections, read_at};
+use page_store::source::PageSource;
 
 use crate::error::XfmError;
 use crate::format::{HEADER_BYTES, Header, SUM_BYTES};
-use crate::header::{long, read};
+use crate::header::long;
 
 /// The tables in their order, and what errors call them in files of version 1.
 const KINDS: [(Kind, &str); 4] = [
@@ -47,7 +47,7 @@ impl Tables {
             let georeference = sections.georeference(source)?;
             Ok(Self { at, bytes, blocks: (blocks.offset, blocks.end()), georeference, sections })
         };
-        read().map_err(|error| XfmError::of_sections(source.name(), error))
+        Ok(read().map_err(|error| FileError::of_sections(source.name(), error))?)
     }
 
     /// In the first version the tables follow each other, each with its checksum behind it.
@@ -67,7 +67,7 @@ impl Tables {
         let mut bytes = [const { Vec::new() }; 4];
         for (i, (_, section)) in KINDS.into_iter().enumerate() {
             bytes[i] = vec![0; (lengths[i] + SUM_BYTES) as usize];
-            read(source, at[i], &mut bytes[i])?;
+            read_at(source, at[i], &mut bytes[i])?;
             let sum = bytes[i].split_off(lengths[i] as usize);
             if u64::from(crc32fast::hash(&bytes[i])) != long(&sum) {
                 let file = source.name().to_owned();

@@ -18,13 +18,12 @@ use vertex_tree::{
 };
 
 use crate::block::ACTIVE;
-use crate::error::XfmError;
+use crate::error::{XfmError, tree_error};
 use crate::file::XfmFile;
+use crate::foresight::peek;
 use crate::half_edges::{Adjacent, BOUNDARY, HalfEdge};
-use crate::loader::Loader;
 use crate::numbering::{Owner, owner};
 use crate::paging::{Paging, PagingCounts};
-use crate::requests::tree_error;
 use crate::settings::{Io, Settings};
 use crate::shown::Shown;
 
@@ -43,18 +42,8 @@ impl XfmTree {
     /// # Errors
     /// If the I/O thread can not be started.
     pub fn new(file: Arc<XfmFile>, settings: Settings) -> Result<Self, XfmError> {
-        let loader = match settings.io {
-            Io::Blocking => None,
-            Io::Simulated(store) => Some(Loader::simulated(file.clone(), store)),
-            Io::Background => Some(Loader::thread(file.clone()).map_err(|source| XfmError::Read {
-                file: file.name().to_owned(),
-                offset: 0,
-                length: 0,
-                source,
-            })?),
-        };
         let roots = file.roots().iter().map(|&(root, _)| root).collect();
-        let paging = Paging::new(file, loader, &settings);
+        let paging = Paging::new(file, &settings)?;
         let foresees = settings.prefetch == Prefetch::Schedule && settings.io != Io::Blocking;
         Ok(Self { paging, roots, shown: None, displayed: 0, foresees })
     }
@@ -62,7 +51,7 @@ impl XfmTree {
     /// The file.
     #[must_use]
     pub fn file(&self) -> &Arc<XfmFile> {
-        &self.paging.file
+        &self.paging.blocks.file
     }
 
     /// Sets the quotas, in bytes of blocks, from now on. What the front occupies stays, whatever the quotas are.
@@ -73,7 +62,7 @@ impl XfmTree {
     /// Bytes of the blocks in memory, and with those that are under way.
     #[must_use]
     pub fn block_bytes(&self) -> (u64, u64) {
-        (self.paging.bytes, self.paging.bytes + self.paging.reserved)
+        (self.paging.blocks.bytes, self.paging.blocks.bytes + self.paging.reserved)
     }
 
     /// What paging has done so far.
@@ -83,7 +72,7 @@ impl XfmTree {
     }
 
     fn damaged(&self, node: NodeId, reason: &'static str) -> TreeError {
-        let file = &self.paging.file;
+        let file = &self.paging.blocks.file;
         let offset = file.place(file.levels().block(node)).0;
         tree_error(XfmError::Node { file: file.name().to_owned(), offset, node: node.0, reason })
     }
@@ -94,7 +83,7 @@ impl XfmTree {
             Owner::Boundary => Some(BOUNDARY),
             Owner::Face(face, k) => Some(face << 2 | k),
             Owner::Node(node, side, k) => {
-                let slot = self.paging.node(node)?.slots[side];
+                let slot = self.paging.blocks.node(node)?.slots[side];
                 (slot != NONE).then_some(slot << 2 | k)
             }
         }
@@ -102,7 +91,7 @@ impl XfmTree {
 
     /// Whether the blocks from that of a needed node up to an active one are loaded; asks for the first that is not.
     fn way_is_loaded(&mut self, needed: NodeId, node: NodeId) -> Result<bool, TreeError> {
-        let levels = self.paging.file.levels();
+        let levels = self.paging.blocks.file.levels();
         let mut at = needed;
         loop {
             let number = levels.block(at);
@@ -111,12 +100,12 @@ impl XfmTree {
                 self.paging.pin_for(node, Some(needed));
                 return Ok(false);
             }
-            if self.paging.node(at).is_none() {
+            if self.paging.blocks.node(at).is_none() {
                 return Err(self.damaged(at, "it is needed, or above one that is, and not there"));
             }
-            match self.paging.block(number).map_or(NONE, |block| block.parent) {
+            match self.paging.blocks.block(number).map_or(NONE, |block| block.parent) {
                 NONE => return Ok(true),
-                parent if self.paging.is_active(NodeId(parent)) => return Ok(true),
+                parent if self.paging.blocks.is_active(NodeId(parent)) => return Ok(true),
                 parent => at = NodeId(parent),
             }
         }
@@ -126,7 +115,7 @@ impl XfmTree {
     fn count_needs(&mut self, adjacent: [u32; 4], step: i32) {
         for h in adjacent {
             if let Owner::Node(needed, ..) = owner(h)
-                && let Some(needed) = self.paging.node_mut(needed)
+                && let Some(needed) = self.paging.blocks.node_mut(needed)
             {
                 needed.status = needed.status.wrapping_add_signed(step);
             }
@@ -147,7 +136,7 @@ impl Hierarchy for XfmTree {
     const HAS_CONES: bool = true;
 
     fn node_limit(&self) -> u32 {
-        (self.paging.file.header().blocks as u32) << self.paging.file.levels().get()
+        (self.paging.blocks.file.header().blocks as u32) << self.paging.blocks.file.levels().get()
     }
 
     fn displayed(&self) -> u64 {
@@ -163,18 +152,18 @@ impl Hierarchy for XfmTree {
     }
 
     fn bounds(&self, node: NodeId) -> Bounds {
-        if let Some(node) = self.paging.node(node) {
+        if let Some(node) = self.paging.blocks.node(node) {
             return node.stored.bounds();
         }
-        let file = &self.paging.file;
+        let file = &self.paging.blocks.file;
         let listed = file.roots().binary_search_by_key(&node, |&(root, _)| root);
-        let stub = || self.paging.stub(file.levels().block(node)).map(|stub| stub.bounds);
+        let stub = || self.paging.blocks.stub(file.levels().block(node)).map(|stub| stub.bounds);
         let bounds = listed.map_or_else(|_| stub(), |i| Some(file.roots()[i].1));
         bounds.unwrap_or(Bounds { center: [0.0; 3], radius: 0.0, eps: 0.0 })
     }
 
     fn normal_cone(&self, node: NodeId) -> NormalCone {
-        match self.paging.node(node) {
+        match self.paging.blocks.node(node) {
             Some(found) if self.parents(node).next().is_some() => found.stored.cone(),
             // The root list has no room for cones, so roots have none.
             _ => NormalCone::NONE,
@@ -183,8 +172,8 @@ impl Hierarchy for XfmTree {
 
     #[inline]
     fn children(&self, node: NodeId) -> impl Iterator<Item = NodeId> {
-        let levels = self.paging.file.levels();
-        let block = self.paging.block(levels.block(node));
+        let levels = self.paging.blocks.file.levels();
+        let block = self.paging.blocks.block(levels.block(node));
         let offset = levels.offset(node);
         let child = move |side: u32| {
             let block = block?;
@@ -201,12 +190,12 @@ impl Hierarchy for XfmTree {
 
     #[inline]
     fn parents(&self, node: NodeId) -> impl Iterator<Item = NodeId> {
-        let levels = self.paging.file.levels();
+        let levels = self.paging.blocks.file.levels();
         let (number, offset) = (levels.block(node), levels.offset(node));
         let parent = match offset {
-            0 => match self.paging.block(number) {
+            0 => match self.paging.blocks.block(number) {
                 Some(block) => block.parent,
-                None => self.paging.stub(number).map_or(NONE, |stub| stub.parent),
+                None => self.paging.blocks.stub(number).map_or(NONE, |stub| stub.parent),
             },
             _ => levels.node(number, (offset - 1) / 2).0,
         };
@@ -214,10 +203,10 @@ impl Hierarchy for XfmTree {
     }
 
     fn log_number(&self, node: NodeId) -> u32 {
-        let file = &self.paging.file;
+        let file = &self.paging.blocks.file;
         let (number, offset) = (file.levels().block(node), file.levels().offset(node));
         // Of a block that is not loaded only the root can be meant.
-        let index = self.paging.block(number).and_then(|block| block.index_of(offset)).unwrap_or(0);
+        let index = self.paging.blocks.block(number).and_then(|block| block.index_of(offset)).unwrap_or(0);
         file.header().nodes as u32 - 1 - file.nodes_before(number) - index as u32
     }
 
@@ -232,7 +221,7 @@ impl Hierarchy for XfmTree {
     }
 
     fn peek(&self, node: NodeId, children: &mut Vec<(NodeId, Bounds)>) -> bool {
-        self.paging.peek(node, children)
+        peek(&self.paging.blocks, node, children)
     }
 
     fn pass(&mut self, time: Duration) -> Result<(), TreeError> {
@@ -268,7 +257,7 @@ impl Hierarchy for XfmTree {
 
 impl VertexTree for XfmTree {
     fn base_mesh<M: MeshSink>(&mut self, mesh: &mut M) -> Result<(), TreeError> {
-        let file = &self.paging.file;
+        let file = &self.paging.blocks.file;
         self.displayed = file.initial_faces().triangles.len() as u64;
         if M::KEEPS_MESH {
             self.shown = Some(Shown::new(file.initial_vertices(), file.initial_faces(), mesh));
@@ -277,30 +266,31 @@ impl VertexTree for XfmTree {
     }
 
     fn unfold<M: MeshSink>(&mut self, node: NodeId, mesh: &mut M) -> Result<Step, TreeError> {
-        let levels = self.paging.file.levels();
+        let levels = self.paging.blocks.file.levels();
         let number = levels.block(node);
         self.paging.stop_waiting(node);
         let own_is_loaded = self.paging.demand(number..number + 1, node);
-        let below = self.paging.child_blocks(node);
+        let below = self.paging.blocks.child_blocks(node);
         if !own_is_loaded || !below.is_some_and(|below| self.paging.demand(below, node)) {
             self.paging.take_error()?;
             self.paging.pin_for(node, None);
             return Ok(Step::NotResident);
         }
-        let Some(stored) = self.paging.node(node).map(|node| node.stored) else {
+        let Some(stored) = self.paging.blocks.node(node).map(|node| node.stored) else {
             return Err(self.damaged(node, "it is not there"));
         };
         let adjacent = stored.adjacent;
         for h in adjacent {
             if let Owner::Node(needed, side, _) = owner(h) {
-                if !self.paging.is_active(needed) {
+                if !self.paging.blocks.is_active(needed) {
                     if needed == node {
                         return Err(self.damaged(node, "it needs itself"));
                     }
                     let is_loaded = self.way_is_loaded(needed, node)?;
                     return Ok(if is_loaded { Step::Needs(needed) } else { Step::NotResident });
                 }
-                if !self.paging.node(needed).is_some_and(|needed| sides(needed.stored.adjacent)[side]) {
+                if !self.paging.blocks.node(needed).is_some_and(|needed| sides(needed.stored.adjacent)[side])
+                {
                     return Err(self.damaged(node, "it needs a triangle that there is not"));
                 }
             }
@@ -311,15 +301,15 @@ impl VertexTree for XfmTree {
             let slots = found.and_then(|adjacent| shown.split(adjacent, stored.position, mesh));
             self.shown = Some(shown);
             let slots = slots.ok_or_else(|| self.damaged(node, "w x y z are not around one vertex"))?;
-            if let Some(node) = self.paging.node_mut(node) {
+            if let Some(node) = self.paging.blocks.node_mut(node) {
                 node.slots = slots;
             }
         }
         self.count_needs(adjacent, 1);
-        if let Some(node) = self.paging.node_mut(node) {
+        if let Some(node) = self.paging.blocks.node_mut(node) {
             node.status |= ACTIVE;
         }
-        if let Some(block) = self.paging.block_mut(number) {
+        if let Some(block) = self.paging.blocks.block_mut(number) {
             block.active += 1;
         }
         self.displayed += brought(adjacent);
@@ -327,7 +317,7 @@ impl VertexTree for XfmTree {
     }
 
     fn fold<M: MeshSink>(&mut self, node: NodeId, mesh: &mut M) -> Result<Step, TreeError> {
-        let Some(&found) = self.paging.node(node).filter(|node| node.is_active()) else {
+        let Some(&found) = self.paging.blocks.node(node).filter(|node| node.is_active()) else {
             return Err(self.damaged(node, "it is not active"));
         };
         if found.needed_by() > 0 {
@@ -338,17 +328,17 @@ impl VertexTree for XfmTree {
             shown.merge(found.slots, mesh);
         }
         self.count_needs(adjacent, -1);
-        if let Some(node) = self.paging.node_mut(node) {
+        if let Some(node) = self.paging.blocks.node_mut(node) {
             node.status &= !ACTIVE;
             node.slots = [NONE; 2];
         }
-        let number = self.paging.file.levels().block(node);
+        let number = self.paging.blocks.file.levels().block(node);
         self.paging.use_block(number);
-        if let Some(block) = self.paging.block_mut(number) {
+        if let Some(block) = self.paging.blocks.block_mut(number) {
             block.active -= 1;
             if block.active == 0 {
                 self.paging.may_go(number);
-                if let Some(sibling) = self.paging.sibling(number) {
+                if let Some(sibling) = self.paging.blocks.sibling(number) {
                     self.paging.may_go(sibling);
                 }
             }

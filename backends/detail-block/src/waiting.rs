@@ -7,17 +7,17 @@
 use std::ops::Range;
 
 use rustc_hash::FxHashMap;
-use vertex_tree::{NONE, NodeId};
+use vertex_tree::NodeId;
 
-use crate::paging::Paging;
+use crate::blocks::Blocks;
 
 /// What a change waits for, and what it needs beside that.
 #[derive(Default)]
-struct Wait {
+pub(crate) struct Wait {
     /// Of these blocks, those that are under way.
-    blocks: Range<u32>,
+    pub blocks: Range<u32>,
     /// Blocks that it has pinned.
-    pinned: Vec<u32>,
+    pub pinned: Vec<u32>,
 }
 
 /// The changes that wait.
@@ -36,79 +36,46 @@ impl Waiting {
         self.pins.contains_key(&block)
     }
 
-    fn pin(&mut self, block: u32) {
-        *self.pins.entry(block).or_default() += 1;
-    }
-
-    fn unpin(&mut self, block: u32) {
-        if let Some(pins) = self.pins.get_mut(&block) {
-            *pins -= 1;
-            if *pins == 0 {
-                self.pins.remove(&block);
-            }
-        }
-    }
-}
-
-impl Paging {
     /// A change waits for those of some blocks that are under way.
     pub fn wait(&mut self, node: NodeId, blocks: Range<u32>) {
-        self.waiting.waits.insert(node, Wait { blocks, pinned: Vec::new() });
+        self.waits.insert(node, Wait { blocks, pinned: Vec::new() });
+    }
+
+    /// What a change waits for.
+    pub fn waits_for(&self, node: NodeId) -> Option<Range<u32>> {
+        self.waits.get(&node).map(|wait| wait.blocks.clone())
     }
 
     /// A change that waits has made use of its own block, of child blocks, and of those on the way up from a node that it
     /// needs, as far as they are loaded: they are pinned.
-    pub fn pin_for(&mut self, node: NodeId, needed: Option<NodeId>) {
-        if !self.waiting.waits.contains_key(&node) {
-            return;
+    pub fn pin_for(&mut self, node: NodeId, needed: Option<NodeId>, blocks: &Blocks) {
+        let Some(wait) = self.waits.get_mut(&node) else { return };
+        let mut pinned = vec![blocks.file.levels().block(node)];
+        pinned.extend(blocks.child_blocks(node).unwrap_or_default());
+        if let Some(needed) = needed {
+            blocks.way_up(needed, |number| pinned.push(number));
         }
-        let levels = self.file.levels();
-        let mut pinned = vec![levels.block(node)];
-        pinned.extend(self.child_blocks(node).unwrap_or_default());
-        let mut at = needed.map_or(NONE, |needed| needed.0);
-        // Block numbers fall on the way up, so this ends.
-        while at != NONE && !self.is_active(NodeId(at)) {
-            let number = levels.block(NodeId(at));
-            pinned.push(number);
-            at = self.block(number).map_or(NONE, |block| block.parent);
+        pinned.retain(|&number| blocks.block(number).is_some());
+        for &number in &pinned {
+            *self.pins.entry(number).or_default() += 1;
         }
-        pinned.retain(|&number| self.block(number).is_some());
-        pinned.iter().for_each(|&number| self.waiting.pin(number));
-        if let Some(wait) = self.waiting.waits.get_mut(&node) {
-            wait.pinned = pinned;
-        }
+        wait.pinned = pinned;
     }
 
-    /// A change does not wait any more: it asks again, or is to.
-    pub fn stop_waiting(&mut self, node: NodeId) {
-        if self.waiting.waits.is_empty() {
-            return;
+    /// A change does not wait any more: what it has pinned is free.
+    pub fn stop(&mut self, node: NodeId) -> Option<Wait> {
+        if self.waits.is_empty() {
+            return None;
         }
-        let Some(Wait { blocks, pinned }) = self.waiting.waits.remove(&node) else { return };
-        for number in pinned {
-            self.waiting.unpin(number);
-            self.use_block(number);
-        }
-        for number in blocks {
-            if let Some(pending) = self.pending.get_mut(&number) {
-                pending.waiting.retain(|&other| other != node);
+        let wait = self.waits.remove(&node)?;
+        for number in &wait.pinned {
+            if let Some(pins) = self.pins.get_mut(number) {
+                *pins -= 1;
+                if *pins == 0 {
+                    self.pins.remove(number);
+                }
             }
         }
-    }
-
-    /// A change that was refused is not wanted any more.
-    pub fn give_up(&mut self, node: NodeId) {
-        self.waiting.again.retain(|&other| other != node);
-        let Some(blocks) = self.waiting.waits.get(&node).map(|wait| wait.blocks.clone()) else { return };
-        self.stop_waiting(node);
-        for number in blocks {
-            let Self { loader: Some(loader), pending, .. } = self else { return };
-            let is_unwanted =
-                |number: u32| pending.get(&number).is_some_and(|pending| pending.waiting.is_empty());
-            let run = loader.take_back(number, |run| run.numbers().all(is_unwanted));
-            if let Some(run) = run {
-                self.withdrawn(run);
-            }
-        }
+        Some(wait)
     }
 }

@@ -14,10 +14,10 @@ impl XfmTree {
     /// # Panics
     /// At the first thing that is wrong.
     pub fn assert_well_formed(&self) {
-        let levels = self.paging.file.levels();
-        let mut displayed = self.paging.file.initial_faces().triangles.len() as u64;
+        let levels = self.paging.blocks.file.levels();
+        let mut displayed = self.paging.blocks.file.initial_faces().triangles.len() as u64;
         let (mut needs, mut needed_by, mut bytes) = (0_u64, 0_u64, 0);
-        for block in self.paging.blocks() {
+        for block in self.paging.blocks.iter() {
             bytes += crate::block::resident_bytes(block.nodes.len() as u32);
             let mut active = 0;
             for offset in 0..levels.full() {
@@ -34,7 +34,7 @@ impl XfmTree {
                     _ => levels.node(block.number, (offset - 1) / 2).0,
                 };
                 assert!(
-                    parent == NONE || self.paging.is_active(NodeId(parent)),
+                    parent == NONE || self.paging.blocks.is_active(NodeId(parent)),
                     "{id:?} is active below a folded node"
                 );
                 let [w, x, y, z] = node.stored.adjacent;
@@ -42,7 +42,7 @@ impl XfmTree {
                     if let Owner::Node(needed, ..) = owner(h) {
                         needs += 1;
                         assert!(
-                            self.paging.is_active(needed),
+                            self.paging.blocks.is_active(needed),
                             "{id:?} is active and {needed:?}, which it needs, is not"
                         );
                     }
@@ -61,7 +61,7 @@ impl XfmTree {
             assert_eq!(active, block.active, "active nodes of block {}", block.number);
         }
         assert_eq!(needs, needed_by, "nodes are needed as often as others need them");
-        assert_eq!(bytes, self.paging.bytes, "bytes of loaded blocks");
+        assert_eq!(bytes, self.paging.blocks.bytes, "bytes of loaded blocks");
         assert_eq!(displayed, self.displayed, "triangles displayed");
         if let Some(shown) = &self.shown {
             shown.assert_well_formed(displayed);

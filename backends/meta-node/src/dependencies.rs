@@ -192,10 +192,11 @@ impl Rules {
     /// unfolds, that is one that was refused in the frame before; when the node is asked again, in this one.
     fn is_held(&mut self, node: NodeId) -> bool {
         let since = if self.unfolds || self.were_held.contains(&node) { self.frame } else { self.frame - 1 };
-        // Each has a larger number than the one that it was named for, so this ends.
+        // Each has a larger number than the one that it was named for, so this ends, unless numbers lie.
         let for_which = |node: &NodeId| self.held.get(node).copied();
         let is_refused = |node: NodeId| self.refused.get(&node).is_some_and(|&frame| frame >= since);
-        let is_held = std::iter::successors(for_which(&node), for_which).any(is_refused);
+        let is_held =
+            std::iter::successors(for_which(&node), for_which).take(self.held.len()).any(is_refused);
         if is_held {
             self.were_held.insert(node);
         }

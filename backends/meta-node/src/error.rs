@@ -1,10 +1,9 @@
 //! What can be wrong with a file of meta-nodes, or with what is asked of it.
 
-use std::io;
-
 use collapse_log::LogError;
 use collapse_log::external::WorkspaceError;
-use container::{FileError, SectionError};
+use container::FileError;
+use page_store::ThreadError;
 
 /// A file could not be written, opened or checked, or a tree could not be made of it.
 #[derive(Debug, thiserror::Error)]
@@ -16,18 +15,6 @@ pub enum MetaNodeError {
     /// Temporary files, or somebody wanted it to end.
     #[error(transparent)]
     Workspace(#[from] WorkspaceError),
-    /// The operating system said no.
-    #[error("{file}: reading or writing {length} bytes at offset {offset}: {source}")]
-    Io {
-        /// The file.
-        file: String,
-        /// Where, in bytes from the start.
-        offset: u64,
-        /// How much.
-        length: u64,
-        /// Why.
-        source: io::Error,
-    },
     /// The collapse log does not fit its mesh.
     #[error(transparent)]
     Log(#[from] LogError),
@@ -82,18 +69,6 @@ pub enum MetaNodeError {
         holders: u32,
     },
     /// The thread that reads could not be started.
-    #[error("no thread for reading: {0}")]
-    Thread(io::Error),
-}
-
-impl MetaNodeError {
-    /// What is wrong with the sections of a file, under the name that it has always had.
-    pub(crate) fn of_sections(file: &str, error: SectionError) -> Self {
-        match error {
-            SectionError::Io { offset, length, source } => {
-                Self::Io { file: file.to_owned(), offset, length, source }
-            }
-            error => FileError::of_sections(file, error).into(),
-        }
-    }
+    #[error(transparent)]
+    Thread(#[from] ThreadError),
 }

@@ -2,13 +2,14 @@
 
 use std::sync::Arc;
 
-use container::{Georeference, Sections};
-use vertex_tree::source::PageSource;
+use container::{FileError, Georeference, Sections, read_at};
+use page_store::source::PageSource;
 use vertex_tree::{Bounds, NodeId};
 
+use crate::check::check;
 use crate::error::MetaNodeError;
 use crate::format::{Header, ROOT_WORDS, Root, TRIANGLE_WORDS, VERTEX_WORDS};
-use crate::page::{self, Layout};
+use crate::page::Layout;
 use crate::tables::Tables;
 
 /// An open file: header, base mesh and the index of the pages are in memory, the pages are not. Shared, unchanging:
@@ -28,6 +29,9 @@ pub struct MetaNodeFile {
     georeference: Georeference,
     sections: Sections,
 }
+
+/// The least number of place holders of the largest size: one in use and three that are not.
+pub(crate) const LEAST_HOLDERS: u32 = 4;
 
 /// Pages between two entries of [`MetaNodeFile::starts`].
 const STRIDE: usize = 64;
@@ -151,8 +155,8 @@ impl MetaNodeFile {
 
     /// Compares the checksums of what this version does not know.
     pub(crate) fn verify_unknown(&self) -> Result<(), MetaNodeError> {
-        let error = |error| MetaNodeError::of_sections(self.name(), error);
-        self.sections.verify_unknown(&*self.source).map_err(error)
+        let error = |error| FileError::of_sections(self.name(), error);
+        Ok(self.sections.verify_unknown(&*self.source).map_err(error)?)
     }
 
     /// Bytes of a page, as it is stored and as its place holder is large.
@@ -177,7 +181,7 @@ impl MetaNodeFile {
     /// Bytes of page memory that a tree needs at least.
     #[must_use]
     pub fn least_memory(&self) -> u64 {
-        self.holder_bytes() * u64::from(crate::pager::LEAST_HOLDERS)
+        self.holder_bytes() * u64::from(LEAST_HOLDERS)
     }
 
     /// Bytes of the largest place holder.
@@ -190,12 +194,21 @@ impl MetaNodeFile {
         let offset = self.page_offset(page);
         let words = &mut words[..self.page_words(page)];
         read_words(&*self.source, offset, words)?;
-        page::check(words, page, &self.header.limits()).map_err(|reason| MetaNodeError::Page {
-            file: self.name().to_owned(),
-            page,
-            offset,
-            reason,
-        })
+        check(words, page, &self.header.limits()).map_err(|reason| self.damaged(page, reason))
+    }
+
+    /// Something is wrong with a page.
+    pub(crate) fn damaged(&self, page: u32, reason: &'static str) -> MetaNodeError {
+        MetaNodeError::Page { file: self.name().to_owned(), page, offset: self.page_offset(page), reason }
+    }
+
+    /// The roots on a page, each with the leaf of its vertex. Base vertices are those of the roots, in their order, and then others.
+    pub(crate) fn roots_of(&self, page: u32) -> impl ExactSizeIterator<Item = (&Root, u32)> {
+        let place =
+            |page: u32| self.roots.partition_point(|root| root.node.0 >> self.header.slot_bits < page);
+        let range = place(page)..place(page + 1);
+        let leaves = self.base_vertices.get(range.clone()).unwrap_or_default();
+        self.roots[range].iter().zip(leaves).map(|(root, &(leaf, _))| (root, leaf))
     }
 
     /// What the file holds, in words and numbers.
@@ -227,13 +240,7 @@ impl MetaNodeFile {
 }
 
 fn read_words(source: &dyn PageSource, offset: u64, words: &mut [u32]) -> Result<(), MetaNodeError> {
-    let bytes: &mut [u8] = bytemuck::cast_slice_mut(words);
-    source.read_at(offset, bytes).map_err(|e| MetaNodeError::Io {
-        file: source.name().to_owned(),
-        offset,
-        length: bytes.len() as u64,
-        source: e,
-    })?;
+    read_at(source, offset, bytemuck::cast_slice_mut(words))?;
     words.iter_mut().for_each(|word| *word = u32::from_le(*word));
     Ok(())
 }

@@ -34,8 +34,8 @@
 //!
 //! The lengths of the tables and of the file follow from the header and are checked before anything is allocated.
 
-use container::FileError;
-use vertex_tree::source::PageSource;
+use container::{FileError, read_at};
+use page_store::source::PageSource;
 use vertex_tree::{Bounds, NodeId};
 
 use crate::error::MetaNodeError;
@@ -126,26 +126,18 @@ impl Header {
     /// Reads and checks the header of a store.
     pub fn read(source: &dyn PageSource) -> Result<Self, MetaNodeError> {
         let file = || source.name().to_owned();
-        let read = |offset: u64, buffer: &mut [u8]| {
-            source.read_at(offset, buffer).map_err(|e| MetaNodeError::Io {
-                file: file(),
-                offset,
-                length: buffer.len() as u64,
-                source: e,
-            })
-        };
         let actual = source.len();
         let mut bytes = [0; HEADER_BYTES as usize];
         if actual < HEADER_BYTES {
             let start = &mut bytes[..actual.min(8) as usize];
-            read(0, start)?;
+            read_at(source, 0, start)?;
             return Err(if *start == MAGIC {
                 FileError::Length { file: file(), expected: HEADER_BYTES, actual }.into()
             } else {
                 foreign(file())
             });
         }
-        read(0, &mut bytes)?;
+        read_at(source, 0, &mut bytes)?;
         let word = |at: usize| u32::from_le_bytes([bytes[at], bytes[at + 1], bytes[at + 2], bytes[at + 3]]);
         if bytes[..8] != MAGIC {
             return Err(foreign(file()));

@@ -9,7 +9,7 @@
 //! # use std::{path::Path, sync::Arc};
 //! # use meta_node::{BuildOptions, MetaNodeFile, MetaNodeTree, Settings};
 //! # use collapse_log::CollapseLog;
-//! # use vertex_tree::source::FileSource;
+//! # use page_store::source::FileSource;
 //! # use vertex_tree::{NullSink, Hierarchy, VertexTree};
 //! # fn main() -> Result<(), Box<dyn std::error::Error>> {
 //! # let log = CollapseLog::default();
@@ -30,7 +30,7 @@ extern crate self as meta_node;
 mod arrange;
 mod arranging;
 mod blocking;
-mod board;
+mod check;
 mod dependencies;
 mod error;
 mod file;
@@ -39,12 +39,11 @@ mod lists;
 mod page;
 mod pager;
 mod settings;
-mod store;
+mod stored;
 mod subtree;
 mod tables;
 mod tree;
 mod verify;
-mod waiting;
 mod write;
 
 pub use collapse_log::external::{Workspace, WorkspaceError};

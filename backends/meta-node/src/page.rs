@@ -43,14 +43,14 @@
 //! to the node that splits, and is stored once in the whole file. Coordinates are stored for the leaves of a block
 //! alone, as there: one a node, its removed vertex. The kept one has come from above.
 
-use vertex_tree::{Bounds, NONE, NodeId, prefetch};
+use vertex_tree::{Bounds, NodeId, prefetch};
 
 /// Words before the nodes.
 pub(crate) const HEADER_WORDS: usize = 9;
 const NODE_WORDS: usize = 14;
 const BLOCK_WORDS: usize = 2;
 const LINK_WORDS: usize = 7;
-const TRIANGLE_WORDS: usize = 3;
+pub(crate) const TRIANGLE_WORDS: usize = 3;
 /// More levels would overflow the 15 bits of slots and links.
 pub(crate) const MOST_LEVELS: u32 = 12;
 
@@ -173,6 +173,10 @@ impl<'a> Page<'a> {
         Link { node: NodeId(words[0]), log_number: words[1], bounds: bounds(&words[2..]) }
     }
 
+    pub fn blocks(self) -> u32 {
+        (self.layout.links_at - self.layout.blocks_at) / BLOCK_WORDS as u32
+    }
+
     pub fn links(self) -> u32 {
         (self.layout.triangles_at - self.layout.links_at) / LINK_WORDS as u32
     }
@@ -229,7 +233,7 @@ impl Node<'_> {
         if parent & 0x8000 == 0 { Ok(parent) } else { Err(parent & 0x7FFF) }
     }
     #[inline(always)]
-    fn triangles_end(self) -> u32 {
+    pub fn triangles_end(self) -> u32 {
         self.words[13]
     }
 }
@@ -264,94 +268,8 @@ pub(crate) fn checksum(words: &[u32]) -> u32 {
     hasher.finalize()
 }
 
-/// Checks a page that has been read: after this, nothing on it leads out of it or of the file.
-///
-/// # Errors
-/// What is wrong, in words.
-pub(crate) fn check(words: &[u32], number: u32, limits: &Limits) -> Result<Layout, &'static str> {
-    if words.len() < HEADER_WORDS {
-        return Err("shorter than the head of a page");
-    }
-    if checksum(words) != words[0] {
-        return Err("its checksum does not match");
-    }
-    if words[1] != number {
-        return Err("it has another page's number");
-    }
-    let layout = layout(words).ok_or("its parts do not add up to its length")?;
-    let Layout { nodes, parent, first_child, children, .. } = layout;
-    if (number < limits.root_pages) != (parent == NONE) || (parent != NONE && parent >= number) {
-        return Err("the page above is none that can be");
-    }
-    if children > 0 && (first_child <= number || limits.pages.checked_sub(children) < Some(first_child)) {
-        return Err("the pages below are none that can be");
-    }
-    let page = Page { words, layout: &layout };
-    let (blocks, links) = ((layout.links_at - layout.blocks_at) / BLOCK_WORDS as u32, page.links());
-    if nodes == 0 || nodes > 1 << limits.slot_bits {
-        return Err("it holds no node, or too many");
-    }
-    for block in 0..blocks {
-        let (above, log_number) = page.above(block);
-        let fits = if parent == NONE {
-            above == NONE && log_number == NONE
-        } else {
-            above >> limits.slot_bits == parent && log_number < limits.collapses
-        };
-        if !fits {
-            return Err("a block does not hang below the page above");
-        }
-    }
-    for link in 0..links {
-        let Link { node, log_number, bounds } = page.link(link);
-        let below = (node.0 >> limits.slot_bits).checked_sub(first_child);
-        if below.is_none_or(|below| below >= children) || log_number >= limits.collapses || !bounds.is_sane()
-        {
-            return Err("a link leads elsewhere than to a page below");
-        }
-    }
-    let mut end = 0;
-    for slot in 0..nodes {
-        let node = page.node(slot);
-        for child in node.children() {
-            let fits = match child {
-                Child::Leaf => true,
-                Child::Slot(child) => slot < child && child < nodes && page.node(child).parent() == Ok(slot),
-                Child::Link(link) => link < links,
-            };
-            if !fits {
-                return Err("a node has an impossible child");
-            }
-        }
-        let parent_fits = match node.parent() {
-            Ok(parent) => parent < slot && page.node(parent).children().contains(&Child::Slot(slot)),
-            Err(block) => block < blocks,
-        };
-        let [kept, removed] = node.leaves();
-        if !parent_fits
-            || kept >= removed
-            || removed >= limits.leaves
-            || node.log_number() >= limits.collapses
-        {
-            return Err("a node has an impossible parent, leaf or number");
-        }
-        if !node.bounds().is_sane() || !node.position().iter().all(|x| x.is_finite()) {
-            return Err("a sphere, an error or a place is not a number");
-        }
-        if node.triangles_end() < end {
-            return Err("the triangles of a node end before they start");
-        }
-        end = node.triangles_end();
-    }
-    let triangles = &words[layout.triangles_at as usize..];
-    if end as usize * TRIANGLE_WORDS != triangles.len() || triangles.iter().any(|&leaf| leaf >= limits.leaves)
-    {
-        return Err("a triangle belongs to no node or has an impossible leaf");
-    }
-    Ok(layout)
-}
-
-fn layout(words: &[u32]) -> Option<Layout> {
+/// Where the parts of a page are, if they add up to its length.
+pub(crate) fn layout(words: &[u32]) -> Option<Layout> {
     let part = |start: u32, count: u32, each: usize| start.checked_add(count.checked_mul(each as u32)?);
     let blocks_at = part(HEADER_WORDS as u32, words[3], NODE_WORDS)?;
     let links_at = part(blocks_at, words[4], BLOCK_WORDS)?;

@@ -1,7 +1,7 @@
 //! How a tree pages.
 
+use page_store::Simulated;
 use vertex_tree::Prefetch;
-use vertex_tree::simulated::Simulated;
 
 use crate::dependencies::Dependencies;
 

@@ -1,7 +1,7 @@
 //! Where the parts of a file are, and what is read of them at once: all but the pages.
 
-use container::{BY_PAGE, FileError, Georeference, Kind, SectionError, Sections};
-use vertex_tree::source::PageSource;
+use container::{BY_PAGE, FileError, Georeference, Kind, SectionError, Sections, read_at};
+use page_store::source::PageSource;
 
 use crate::error::MetaNodeError;
 use crate::format::{HEADER_BYTES, Header};
@@ -40,7 +40,7 @@ impl Tables {
             let georeference = sections.georeference(source)?;
             Ok(Self { at, words, pages_at, georeference, sections })
         };
-        read().map_err(|error| MetaNodeError::of_sections(source.name(), error))
+        Ok(read().map_err(|error| FileError::of_sections(source.name(), error))?)
     }
 
     /// In the first version the tables follow each other and have one checksum, in the header.
@@ -57,12 +57,7 @@ impl Tables {
         }
         let mut bytes = vec![0; length as usize];
         let offset = HEADER_BYTES;
-        source.read_at(offset, &mut bytes).map_err(|source| MetaNodeError::Io {
-            file: file(),
-            offset,
-            length,
-            source,
-        })?;
+        read_at(source, offset, &mut bytes)?;
         if crc32fast::hash(&bytes) != header.tables_checksum {
             return Err(FileError::Checksum { file: file(), offset, section: "tables" }.into());
         }

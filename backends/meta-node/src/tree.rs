@@ -17,8 +17,8 @@ use crate::settings::Settings;
 
 /// A file of meta-nodes, and the state of one front through it.
 ///
-/// Everything here runs on the caller's thread, and place holders belong to it; one more thread reads pages (see
-/// `board.rs`). It starts with the tree and ends after it. With [`Io::Simulated`](crate::Io::Simulated) there is none.
+/// Everything here runs on the caller's thread, and place holders belong to it; one more thread, of the page store, reads pages.
+/// It starts with the tree and ends after it. With [`Io::Simulated`](crate::Io::Simulated) there is none.
 pub struct MetaNodeTree {
     pager: Pager,
     roots: Vec<NodeId>,
@@ -163,12 +163,16 @@ impl MetaNodeTree {
         NodeId(page << self.slot_bits)..NodeId((page + 1) << self.slot_bits)
     }
 
-    fn damaged(&self, page: u32) -> TreeError {
+    fn damaged(&self, page: u32, reason: &'static str) -> TreeError {
         let file = &self.pager.file;
-        TreeError::Damaged {
-            file: file.name().to_owned(),
-            offset: file.page_offset(page),
-            reason: "a link leads to a node that it does not have",
+        TreeError::Damaged { file: file.name().to_owned(), offset: file.page_offset(page), reason }
+    }
+
+    /// Whether a change of a node of a page did not fit what is displayed.
+    fn check_fit(&mut self, page: u32) -> Result<(), TreeError> {
+        match self.mesh.as_mut().and_then(StarMesh::take_misfit) {
+            None => Ok(()),
+            Some(_) => Err(self.damaged(page, "the leaves of a node are not where they should be")),
         }
     }
 
@@ -350,6 +354,8 @@ impl Hierarchy for MetaNodeTree {
     }
 
     fn end_frame(&mut self) -> Result<PageStats, TreeError> {
+        // It is not known by then which node it was.
+        self.check_fit(0)?;
         Ok(self.pager.end_frame())
     }
 }
@@ -389,7 +395,7 @@ impl VertexTree for MetaNodeTree {
         let (own, slot) = self.place(node);
         let page = self.pager.page(holder);
         if slot >= page.layout.nodes {
-            return Err(self.damaged(own));
+            return Err(self.damaged(own, "a link leads to a node that it does not have"));
         }
         if self.pager.is_printed() && !self.has_pages_below(node, holder) {
             return Ok(Step::NotResident);
@@ -404,9 +410,12 @@ impl VertexTree for MetaNodeTree {
             // Rules look at the mesh as it is.
             if self.rules.is_some() {
                 stars.update(mesh);
+                self.check_fit(own)?;
             }
         }
         self.displayed += u64::from(end - start);
+        let page = self.pager.page(holder);
+        let of = page.node(slot);
         if let (Some(rules), Some(stars)) = (&mut self.rules, &self.mesh) {
             rules.split(node, leaves[1]);
             for (leaf, half) in leaves.into_iter().zip(halves(node.0 - slot, page, of)) {
@@ -430,15 +439,22 @@ impl VertexTree for MetaNodeTree {
         let (own, slot) = self.place(node);
         let page = self.pager.page(holder);
         if slot >= page.layout.nodes {
-            return Err(self.damaged(own));
+            return Err(self.damaged(own, "a link leads to a node that it does not have"));
         }
         let of = page.node(slot);
         let (children, leaves @ [kept, _], collapse) = (of.children(), of.leaves(), of.log_number());
         let (start, end) = page.brought_range(slot);
         if let Some(stars) = &mut self.mesh {
             stars.merge(leaves, mesh);
-            if let Some(rules) = &mut self.rules {
+            if self.rules.is_some() {
                 stars.update(mesh);
+                self.check_fit(own)?;
+            }
+        }
+        let page = self.pager.page(holder);
+        let of = page.node(slot);
+        if let Some(stars) = &self.mesh {
+            if let Some(rules) = &mut self.rules {
                 halves(node.0 - slot, page, of).into_iter().for_each(|half| rules.leave(half));
                 let parent = match of.parent() {
                     Ok(slot) => Some(page.node(slot).log_number()),

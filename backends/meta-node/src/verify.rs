@@ -2,6 +2,7 @@
 
 use vertex_tree::{Bounds, NONE, NodeId};
 
+use crate::check::check_nesting;
 use crate::error::MetaNodeError;
 use crate::file::MetaNodeFile;
 use crate::page::{Child, Page};
@@ -96,101 +97,51 @@ impl Verifier<'_> {
     fn page(&mut self, number: u32, tops: &[Expected]) -> Result<Vec<Expected>, MetaNodeError> {
         let file = self.file;
         let layout = file.read_page(number, &mut self.words)?;
-        let damaged = |reason| MetaNodeError::Page {
-            file: file.name().to_owned(),
-            page: number,
-            offset: file.page_offset(number),
-            reason,
-        };
+        let damaged = |reason| file.damaged(number, reason);
         let page = Page { words: &self.words[..file.page_words(number)], layout: &layout };
         let (bits, slot_of) =
             (file.header.slot_bits, |node: NodeId| node.0 & ((1 << file.header.slot_bits) - 1));
-        let mut below: Vec<Option<Expected>> = vec![None; page.links() as usize];
-        let mut ends: Vec<u32> = vec![NONE; layout.nodes as usize];
         let mut tops = tops.iter();
+        let mut ends = vec![NONE; layout.nodes as usize];
         for slot in 0..layout.nodes {
             let node = page.node(slot);
-            let [first, pivot] = node.leaves();
-            let id = number << bits | slot;
             if let Err(block) = node.parent() {
                 let Some(top) = tops.next() else { return Err(damaged("a block that nothing leads to")) };
                 if slot_of(top.node) != slot
                     || page.above(block) != top.above
                     || node.bounds() != top.bounds
                     || node.log_number() != top.log_number
-                    || first != top.first
+                    || node.leaves()[0] != top.first
                 {
                     return Err(damaged("the topmost node of a block is not what the page above says"));
                 }
                 ends[slot as usize] = top.end.unwrap_or(NONE);
             }
-            let end = ends[slot as usize];
-            if pivot >= end {
-                return Err(damaged("the leaves of a node are not nested"));
-            }
             match self.met.get_mut(node.log_number() as usize) {
                 Some(met) if !*met => *met = true,
                 _ => return Err(damaged("two nodes have the same number in the log")),
             }
-            for (child, (from, to)) in node.children().into_iter().zip([(first, pivot), (pivot, end)]) {
-                let (bounds, log_number) = match child {
-                    Child::Leaf if to - from == 1 => continue,
-                    Child::Leaf => return Err(damaged("a leaf of the forest stands for several")),
-                    Child::Slot(child) => {
-                        ends[child as usize] = to;
-                        let child = page.node(child);
-                        if child.leaves()[0] != from {
-                            return Err(damaged("the leaves of a child are not those of its side"));
-                        }
-                        (child.bounds(), child.log_number())
-                    }
-                    Child::Link(link) => {
-                        let at = page.link(link);
-                        let expected = Expected {
-                            node: at.node,
-                            above: (id, node.log_number()),
-                            bounds: at.bounds,
-                            log_number: at.log_number,
-                            first: from,
-                            end: Some(to),
-                        };
-                        if below[link as usize].replace(expected).is_some() {
-                            return Err(damaged("a link is used twice"));
-                        }
-                        (at.bounds, at.log_number)
-                    }
-                };
-                if log_number >= node.log_number() {
-                    return Err(damaged("a child is younger than its parent"));
-                }
-                if !is_nested(&bounds, &node.bounds()) {
-                    return Err(damaged("a sphere or an error is not nested"));
-                }
-            }
-            for corners in page.brought(slot) {
-                self.triangles += 1;
-                let sides = corners.map(|leaf| match leaf {
-                    leaf if (first..pivot).contains(&leaf) => 0,
-                    leaf if (pivot..end).contains(&leaf) => 1,
-                    _ => 2,
+            self.triangles += page.brought(slot).len() as u64;
+        }
+        let below_links = check_nesting(page, |slot| ends[slot as usize]).map_err(damaged)?;
+        let mut below = Vec::new();
+        for slot in 0..layout.nodes {
+            for child in page.node(slot).children() {
+                let Child::Link(link) = child else { continue };
+                let (at, leaves) = (page.link(link), &below_links[link as usize]);
+                below.push(Expected {
+                    node: at.node,
+                    above: (number << bits | slot, page.node(slot).log_number()),
+                    bounds: at.bounds,
+                    log_number: at.log_number,
+                    first: leaves.start,
+                    end: Some(leaves.end),
                 });
-                if !matches!(sides, [2, 0, 1] | [2, 1, 0]) {
-                    return Err(damaged("a triangle is not brought by its node"));
-                }
             }
         }
         if tops.next().is_some() {
             return Err(damaged("a node that the page above names is not there"));
         }
-        let below: Option<Vec<Expected>> = below.into_iter().collect();
-        below.ok_or_else(|| damaged("a link that no node uses"))
+        Ok(below)
     }
-}
-
-/// Whether a sphere is within another, up to the rounding of f32, and its error no larger.
-fn is_nested(inner: &Bounds, outer: &Bounds) -> bool {
-    let apart = |axis: usize| f64::from(inner.center[axis]) - f64::from(outer.center[axis]);
-    let distance = (0..3).map(apart).map(|x| x * x).sum::<f64>().sqrt();
-    let slack = f64::from(outer.radius) * 1e-5;
-    distance + f64::from(inner.radius) <= f64::from(outer.radius) + slack && inner.eps <= outer.eps
 }

@@ -7,7 +7,7 @@ use std::sync::atomic::{AtomicBool, Ordering};
 
 use collapse_log::external::{Workspace, WorkspaceError};
 use collapse_log::{CollapseLog, LogSource};
-use container::{BY_PAGE, Georeference, Kind, SectionWriter, output};
+use container::{BY_PAGE, FileError, Georeference, Kind, SectionWriter, output};
 use vertex_tree::NONE;
 
 use crate::arrange::{Arrangement, Node};
@@ -63,7 +63,7 @@ pub fn write(path: &Path, log: &CollapseLog, options: &BuildOptions) -> Result<W
 /// memory. Beside it, 5 bytes a vertex and 40 a page are needed.
 ///
 /// # Errors
-/// [`MetaNodeError::Log`], [`MetaNodeError::Levels`], [`MetaNodeError::TooLarge`], [`MetaNodeError::Io`],
+/// [`MetaNodeError::Log`], [`MetaNodeError::Levels`], [`MetaNodeError::TooLarge`], [`FileError::Write`],
 /// [`MetaNodeError::Workspace`].
 pub fn write_within(
     path: &Path,
@@ -87,9 +87,11 @@ pub fn write_within(
         (written, bytes) = writer.write(file, log.georeference())?;
         arrangement.check()
     })
-    .map_err(|source| match source {
-        _ if workspace.stop.load(Ordering::Relaxed) => WorkspaceError::Interrupted.into(),
-        source => MetaNodeError::Io { file: path.display().to_string(), offset: 0, length: 0, source },
+    .map_err(|source| -> MetaNodeError {
+        match source {
+            _ if workspace.stop.load(Ordering::Relaxed) => WorkspaceError::Interrupted.into(),
+            source => FileError::write(path, source).into(),
+        }
     })?;
     Ok(WriteReport {
         levels,

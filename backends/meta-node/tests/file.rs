@@ -7,8 +7,8 @@ use std::sync::Arc;
 use collapse_log::{Collapse, CollapseLog};
 use common::{bytes, open, random_log};
 use meta_node::{BuildOptions, FileError, MAGIC, MetaNodeError, MetaNodeFile};
+use page_store::source::MemorySource;
 use vertex_tree::Bounds;
-use vertex_tree::source::MemorySource;
 
 fn options(levels: u32, page_bytes: u32) -> BuildOptions {
     BuildOptions { levels: Some(levels), page_bytes }

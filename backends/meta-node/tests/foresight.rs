@@ -7,8 +7,8 @@ use std::time::Duration;
 
 use common::{Front, bytes, frame, holder_bytes, random_log};
 use meta_node::{BuildOptions, Io, MetaNodeFile, MetaNodeTree, Settings};
-use vertex_tree::simulated::Simulated;
-use vertex_tree::source::MemorySource;
+use page_store::Simulated;
+use page_store::source::MemorySource;
 use vertex_tree::{Hierarchy, NodeId, NullSink, PageStats, Prefetch, Step, VertexTree};
 
 const MS: Duration = Duration::from_millis(1);

@@ -8,7 +8,7 @@ use std::time::{Duration, Instant};
 
 use common::{Front, Random, bytes, frame, holder_bytes, random_log};
 use meta_node::{BuildOptions, InUse, MetaNodeError, MetaNodeFile, MetaNodeTree, Settings};
-use vertex_tree::source::{Faults, Faulty, MemorySource, PageSource, Throttled};
+use page_store::source::{Faults, Faulty, MemorySource, PageSource, Throttled};
 use vertex_tree::{Hierarchy, NullSink, VertexTree};
 
 const PAGES: BuildOptions = BuildOptions { levels: Some(3), page_bytes: 700 };

@@ -32,7 +32,7 @@ use std::sync::atomic::{AtomicBool, Ordering};
 
 use collapse_log::external::{Scratch, Workspace};
 use collapse_log::{CollapseLog, LogCounts, LogSource};
-use container::output;
+use container::{FileError, output};
 use vertex_tree::NONE;
 
 pub use self::report::WriteReport;
@@ -61,7 +61,7 @@ pub fn write(path: &Path, log: &CollapseLog, options: &BuildOptions) -> Result<W
 /// it has to for whoever opens the file.
 ///
 /// # Errors
-/// [`MtError::Log`] if the log does not fit its mesh, [`MtError::TooLarge`], [`MtError::Io`] and
+/// [`MtError::Log`] if the log does not fit its mesh, [`MtError::TooLarge`], [`FileError::Write`] and
 /// [`MtError::Workspace`].
 pub fn write_within(
     path: &Path,
@@ -74,11 +74,14 @@ pub fn write_within(
     let scratch = Scratch { folder: workspace.folder.clone() };
     let memory = usize::try_from(workspace.memory.max(LEAST_MEMORY)).unwrap_or(usize::MAX);
     let work = Work { log, scratch: &scratch, memory, stop: workspace.stop };
-    let io = |source| MtError::Io { file: path.display().to_string(), offset: 0, length: 0, source };
-    let name = |failure| match failure {
-        Failure::Log(error) => error.into(),
-        Failure::Output(source) if !workspace.stop.load(Ordering::Relaxed) => io(source),
-        Failure::Output(source) | Failure::Temporary(source) => workspace.error(source).into(),
+    let name = |failure| -> MtError {
+        match failure {
+            Failure::Log(error) => error.into(),
+            Failure::Output(source) if !workspace.stop.load(Ordering::Relaxed) => {
+                FileError::write(path, source).into()
+            }
+            Failure::Output(source) | Failure::Temporary(source) => workspace.error(source).into(),
+        }
     };
     let arranged = arrange(work, options).map_err(name)?;
     // Errors of the closure are those of the operating system alone: ours are kept beside it.
@@ -88,7 +91,7 @@ pub fn write_within(
         if outcome.is_ok() { Ok(()) } else { Err(io::ErrorKind::Other.into()) }
     });
     let report = outcome.map_err(name)?;
-    written.map_err(io)?;
+    written.map_err(|source| FileError::write(path, source))?;
     Ok(report)
 }
 

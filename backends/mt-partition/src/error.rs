@@ -1,10 +1,9 @@
 //! What can go wrong with a file.
 
-use std::io;
-
 use collapse_log::LogError;
 use collapse_log::external::WorkspaceError;
-use container::{FileError, SectionError};
+use container::FileError;
+use page_store::ThreadError;
 
 /// A file could not be written, opened or read.
 #[derive(Debug, thiserror::Error)]
@@ -16,18 +15,9 @@ pub enum MtError {
     /// Temporary files, or somebody wanted it to end.
     #[error(transparent)]
     Workspace(#[from] WorkspaceError),
-    /// The operating system or the store said no.
-    #[error("{file}: {length} bytes at offset {offset}: {source}")]
-    Io {
-        /// The file.
-        file: String,
-        /// Where.
-        offset: u64,
-        /// How many bytes.
-        length: u64,
-        /// Why.
-        source: io::Error,
-    },
+    /// The thread that reads could not be started.
+    #[error(transparent)]
+    Thread(#[from] ThreadError),
     /// A number is out of range.
     #[error("{file}: offset {offset}: {what} {value} out of range")]
     Range {
@@ -73,16 +63,4 @@ pub enum MtError {
         /// The least that would do.
         needed: u64,
     },
-}
-
-impl MtError {
-    /// What is wrong with the sections of a file, under the name that it has always had.
-    pub(crate) fn of_sections(file: &str, error: SectionError) -> Self {
-        match error {
-            SectionError::Io { offset, length, source } => {
-                Self::Io { file: file.to_owned(), offset, length, source }
-            }
-            error => FileError::of_sections(file, error).into(),
-        }
-    }
 }

@@ -2,8 +2,8 @@
 
 use std::sync::Arc;
 
-use container::{Georeference, Sections};
-use vertex_tree::source::PageSource;
+use container::{FileError, Georeference, Sections, read_at};
+use page_store::source::PageSource;
 use vertex_tree::{Bounds, NONE, NodeId};
 
 use super::error::MtError;
@@ -25,6 +25,8 @@ pub struct MtFile {
     offsets: Vec<u64>,
     pub(crate) log_numbers: Vec<u32>,
     pub(crate) base: Record,
+    /// The nodes that arcs of the source lead to, each with the position of that arc, in the order of the nodes.
+    below_base: Vec<(u32, u32)>,
     georeference: Georeference,
     sections: Option<Sections>,
 }
@@ -126,6 +128,9 @@ impl MtFile {
         if base.number() != NONE || base.above().next().is_some() {
             return Err(range(*at, "number of the source", base.number()));
         }
+        let mut below_base: Vec<(u32, u32)> =
+            base.arcs().map(|arc| arc.below).zip(0..).filter(|&(below, _)| below != NONE).collect();
+        below_base.sort_unstable();
         let (georeference, sections) = (tables.georeference, tables.sections);
         Ok(Self {
             source,
@@ -137,6 +142,7 @@ impl MtFile {
             offsets,
             log_numbers,
             base,
+            below_base,
             georeference,
             sections,
         })
@@ -151,7 +157,9 @@ impl MtFile {
     /// Compares the checksums of what this version does not know.
     pub(crate) fn verify_unknown(&self) -> Result<(), MtError> {
         let Some(sections) = &self.sections else { return Ok(()) };
-        sections.verify_unknown(&*self.source).map_err(|error| MtError::of_sections(self.name(), error))
+        Ok(sections
+            .verify_unknown(&*self.source)
+            .map_err(|error| FileError::of_sections(self.name(), error))?)
     }
 
     /// What errors call the file.
@@ -236,6 +244,12 @@ impl MtFile {
         self.roots.binary_search(&node).ok().map(|at| self.root_bounds[at])
     }
 
+    /// The position of the arc from the source to a node among those of the source, if there is one.
+    pub(crate) fn position_in_base(&self, node: u32) -> Option<u32> {
+        let at = self.below_base.binary_search_by_key(&node, |&(below, _)| below).ok()?;
+        Some(self.below_base[at].1)
+    }
+
     /// Bytes of a node as stored.
     pub(crate) fn length(&self, node: u32) -> u64 {
         self.offsets[node as usize + 1] - self.offsets[node as usize]
@@ -254,10 +268,15 @@ impl MtFile {
 
     /// Reads the records of nodes with consecutive numbers, in one go. A record that is damaged is told apart from the
     /// others.
-    pub(crate) fn read(&self, nodes: std::ops::Range<u32>) -> Result<Vec<Result<Record, MtError>>, MtError> {
+    pub(crate) fn read(
+        &self,
+        nodes: std::ops::Range<u32>,
+        bytes: &mut Vec<u8>,
+    ) -> Result<Vec<Result<Record, MtError>>, MtError> {
         let opener = Opener { source: &*self.source };
         let start = self.offsets[nodes.start as usize];
-        let bytes = opener.read(start, self.offsets[nodes.end as usize] - start)?;
+        bytes.resize((self.offsets[nodes.end as usize] - start) as usize, 0);
+        read_at(&*self.source, start, bytes)?;
         let limits = Limits { nodes: self.nodes(), vertices: self.header.vertices as u32 };
         let record = |node: u32| {
             let [from, to] = [node, node + 1].map(|n| (self.offsets[n as usize] - start) as usize);
@@ -275,13 +294,13 @@ impl MtFile {
 
     pub(crate) fn read_node(&self, node: u32) -> Result<Record, MtError> {
         // One range, one record.
-        self.read(node..node + 1)?.remove(0)
+        self.read(node..node + 1, &mut Vec::new())?.remove(0)
     }
 
     /// Reads a node. May wait for the disk.
     ///
     /// # Errors
-    /// [`MtError::Io`], or what is wrong with the record.
+    /// [`FileError::Read`], or what is wrong with the record.
     pub fn node(&self, node: NodeId) -> Result<StoredNode, MtError> {
         if node.0 >= self.nodes() {
             let opener = Opener { source: &*self.source };

@@ -3,7 +3,7 @@
 //!
 //! ```
 //! # use std::sync::Arc;
-//! # use vertex_tree::source::FileSource;
+//! # use page_store::source::FileSource;
 //! # use collapse_log::CollapseLog;
 //! # use vertex_tree::{NullSink, Hierarchy, VertexTree};
 //! # use mt_partition::{BuildOptions, MtFile, MtTree, Settings, write};

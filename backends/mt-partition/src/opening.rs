@@ -1,8 +1,8 @@
 //! Reading header, tables and base mesh, of all versions.
 
-use container::{BY_PAGE, FileError, Georeference, Kind, SectionError, Sections};
+use container::{BY_PAGE, FileError, Georeference, Kind, SectionError, Sections, read_at};
+use page_store::source::PageSource;
 use vertex_tree::NONE;
-use vertex_tree::source::PageSource;
 
 use super::error::MtError;
 use crate::format::{CHECKSUM, HEADER, Header, MAGIC, VERSION};
@@ -30,10 +30,12 @@ impl Opener<'_> {
 
     /// Reads bytes, of which there are so many.
     pub fn read(&self, offset: u64, length: u64) -> Result<Vec<u8>, MtError> {
-        let io = |source| MtError::Io { file: self.file(), offset, length, source };
-        let room = usize::try_from(length).map_err(|_| io(std::io::ErrorKind::OutOfMemory.into()))?;
+        let room = usize::try_from(length).map_err(|_| {
+            let source = std::io::ErrorKind::OutOfMemory.into();
+            FileError::Read { file: self.file(), offset, length, source }
+        })?;
         let mut bytes = vec![0; room];
-        self.source.read_at(offset, &mut bytes).map_err(io)?;
+        read_at(self.source, offset, &mut bytes)?;
         Ok(bytes)
     }
 
@@ -101,7 +103,7 @@ impl Opener<'_> {
             let (records_at, sections) = (records.offset, Some(sections));
             Ok(Tables { roots, partitions, nodes, base, records_at, georeference, sections })
         };
-        read().map_err(|error| MtError::of_sections(self.source.name(), error))
+        Ok(read().map_err(|error| FileError::of_sections(self.source.name(), error))?)
     }
 
     /// In the first version all follows each other, and each table has its checksum behind it.
@@ -139,7 +141,8 @@ impl Opener<'_> {
             return Ok(());
         };
         let found = sections.find(Kind::PAGES, BY_PAGE, length);
-        found.map(|_| ()).map_err(|error| MtError::of_sections(self.source.name(), error))
+        found.map_err(|error| FileError::of_sections(self.source.name(), error))?;
+        Ok(())
     }
 }
 

@@ -13,45 +13,31 @@
 //! Groups come first. What is foreseen (`foresight`) is fetched behind them and has to make do with the room that they
 //! leave (`room`).
 //!
-//! All of this runs on the thread of the tree; see [`reader`](crate::reader) for the one that reads.
+//! Nodes that contradict each other, as a record that has come and one that was there may, count as badly read: they are let go of, and
+//! read again later.
+//!
+//! All of this runs on the thread of the tree.
 
-mod answers;
-mod cut;
+mod change;
 mod foresight;
+mod nodes;
 mod room;
 
-use std::ops::Range;
 use std::sync::Arc;
 use std::time::Duration;
 
+use page_store::{Arrival, Failures, NOW, Requests, Ticket};
 use rustc_hash::FxHashMap;
-use vertex_tree::{NONE, NodeId, PageStats, Prefetch};
+use vertex_tree::{NodeId, PageStats, Prefetch};
 
+pub(crate) use self::change::Change;
+use self::change::Need;
 use self::foresight::Foresight;
-use self::room::Need;
-use crate::cache::{CacheMode, PartitionState};
+use self::nodes::Nodes;
+use crate::cache::CacheMode;
 use crate::file::MtFile;
 use crate::memory::Memory;
-use crate::reader::{Answer, Line, NOW, Reader, Ticket};
-use crate::record::Record;
-use crate::residents::{OVERHEAD, Residents};
-
-/// Which neighbours a change needs.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(crate) enum Change {
-    Unfold,
-    Fold,
-}
-
-impl Change {
-    /// The nodes that the change of a node needs beyond the node itself.
-    fn neighbours(self, record: &Record, mut f: impl FnMut(u32)) {
-        match self {
-            Self::Unfold => record.below().for_each(f),
-            Self::Fold => record.above().filter(|&(n, _)| n != NONE).for_each(|(n, _)| f(n)),
-        }
-    }
-}
+use crate::reader::{Reader, Stored};
 
 /// A group that has been asked for.
 #[derive(Debug)]
@@ -67,33 +53,22 @@ struct Read {
     ticket: Ticket,
     /// The nodes whose groups wait for it; none if it is only foreseen, or if none is wanted any more.
     waiting: Vec<u32>,
-    /// Whether it was asked for ahead of time, and no group has waited for it since.
-    is_ahead: bool,
 }
 
 /// Frames in which the cache mode may wait for answers: what has arrived for a change that waits for more would be let go
 /// of otherwise. A front that never comes to rest must not keep everything.
 const PATIENCE: u32 = 16;
 
-/// What is known of a node, in memory or not: all that a change asks about its neighbours lies together.
-#[derive(Clone, Copy, Debug)]
-struct NodeState {
-    partition: u32,
-    /// Its arcs in the cut.
-    links: u32,
-    is_active: bool,
-    /// Whether it is on its way and there is room for it.
-    is_reserved: bool,
-}
+/// A read that has failed is tried again after 1, 2, 4 ... frames, up to this many.
+const LONGEST_PAUSE: u64 = 64;
+
+/// Frames of foresight, at least.
+const LEAST_AHEAD: u32 = 2;
 
 #[derive(Debug)]
 pub(crate) struct Paging {
-    file: Arc<MtFile>,
-    mode: CacheMode,
-    line: Line,
-    pub residents: Residents,
-    partitions: Vec<PartitionState>,
-    nodes: Vec<NodeState>,
+    pub nodes: Nodes,
+    requests: Requests<Stored>,
     frame: u64,
     /// By the node that is to change.
     groups: FxHashMap<u32, Group>,
@@ -107,12 +82,11 @@ pub(crate) struct Paging {
     first: Option<(u32, bool)>,
     /// Changes that can be asked for again in the next frame.
     again: Vec<u32>,
-    /// What was read badly: how often in a row, and the frame from which on it may be tried again.
-    failures: FxHashMap<u32, (u32, u64)>,
-    dirty: Vec<u32>,
-    answers: Vec<Answer>,
-    /// Nodes that an answer has brought, in ascending order. Kept for its allocation.
+    failures: Failures<u32>,
+    /// Nodes that an answer has brought, in ascending order, and those that the cache mode lets go of. Kept for their allocations.
     brought: Vec<u32>,
+    gone: Vec<u32>,
+    arrivals: Vec<Arrival<Stored>>,
     unanswered_frames: u32,
     /// This tree's number among those that share the budget.
     member: u64,
@@ -121,12 +95,9 @@ pub(crate) struct Paging {
     has_told: bool,
     /// Frames in a row in which room was wanted that could not be had by letting go of what no cut holds.
     pressed: u32,
-    /// Whether nodes go for want of room only, whatever the cache mode.
-    keeps_all: bool,
     /// What the engine foresees, where that is asked for.
     foresight: Option<Foresight>,
     stats: PageStats,
-    pub is_lost: bool,
 }
 
 impl Paging {
@@ -135,62 +106,28 @@ impl Paging {
         mode: CacheMode,
         prefetch: Prefetch,
         memory: Memory,
-        reader: Reader,
+        reader: &Reader,
     ) -> Self {
-        let member = memory.join();
-        let state = |node| NodeState {
-            partition: file.partition_of(node),
-            links: 0,
-            is_active: false,
-            is_reserved: false,
-        };
-        let mut paging = Self {
-            member,
+        Self {
+            member: memory.join(),
             wanted: 0,
             has_told: false,
-            line: Line::new(reader, file.clone()),
-            mode,
-            residents: Residents::new(file.nodes(), memory),
-            partitions: vec![PartitionState::default(); file.partitions.len() - 1],
-            nodes: (0..file.nodes()).map(state).collect(),
+            requests: reader.requests(file.clone()),
+            nodes: Nodes::new(file, mode, memory),
             frame: 0,
             groups: FxHashMap::default(),
             reads: FxHashMap::default(),
             deferred: Vec::new(),
             first: None,
             again: Vec::new(),
-            failures: FxHashMap::default(),
-            dirty: Vec::new(),
-            answers: Vec::new(),
+            failures: Failures::new(LONGEST_PAUSE),
             brought: Vec::new(),
+            gone: Vec::new(),
+            arrivals: Vec::new(),
             unanswered_frames: 0,
             pressed: 0,
-            keeps_all: false,
             foresight: (prefetch == Prefetch::Schedule).then(Foresight::default),
             stats: PageStats::default(),
-            is_lost: false,
-            file,
-        };
-        for root in &paging.file.clone().roots {
-            paging.enter(root.0);
-        }
-        paging
-    }
-
-    fn bytes_of(&self, node: u32) -> u64 {
-        self.file.length(node) + OVERHEAD
-    }
-
-    /// What is read to get a node.
-    fn unit_of(&self, node: u32) -> u32 {
-        if self.mode.reads_partitions() { self.file.partition_of(node) } else { node }
-    }
-
-    fn nodes_of(&self, unit: u32) -> Range<u32> {
-        if self.mode.reads_partitions() {
-            self.file.partitions[unit as usize]..self.file.partitions[unit as usize + 1]
-        } else {
-            unit..unit + 1
         }
     }
 
@@ -198,16 +135,9 @@ impl Paging {
     #[inline]
     pub fn prepare(&self, node: u32, step: usize) {
         match step {
-            0 => {
-                self.residents.prefetch_slot(node);
-                vertex_tree::prefetch(&self.nodes, node as usize);
-            }
-            1 => self.residents.prefetch(node),
-            _ => {
-                if let Some(record) = self.residents.get(node) {
-                    record.prefetch();
-                }
-            }
+            0 => self.nodes.prefetch(node),
+            1 => self.nodes.residents.prefetch(node),
+            _ => self.prepare_all(&[node]),
         }
     }
 
@@ -215,7 +145,7 @@ impl Paging {
     #[inline]
     pub fn prepare_all(&self, nodes: &[u32]) {
         for &node in nodes {
-            if let Some(record) = self.residents.get(node) {
+            if let Some(record) = self.nodes.residents.get(node) {
                 record.prefetch();
             }
         }
@@ -225,15 +155,15 @@ impl Paging {
 
     /// Whether all that a change of a node needs is in memory. If not, it has been asked for.
     pub fn has(&mut self, node: u32, change: Change) -> bool {
-        if let Some(record) = self.residents.get(node) {
+        if let Some(record) = self.nodes.residents.get(node) {
             let mut all = true;
             change.neighbours(record, |n| {
-                all &= self.residents.contains(n);
-                self.residents.prefetch(n);
+                all &= self.nodes.residents.contains(n);
+                self.nodes.residents.prefetch(n);
             });
             if all {
                 self.first = self.first.filter(|&(first, _)| first != node);
-                return true;
+                return self.nodes.agrees(node, change) || self.contradicts(node);
             }
         }
         if let Some((_, is_asked_for)) = self.first.as_mut().filter(|(first, _)| *first == node) {
@@ -245,17 +175,33 @@ impl Paging {
         false
     }
 
+    /// A node and one beside it say different things of each other: no change is made with it before it has been read anew.
+    #[cold]
+    fn contradicts(&mut self, node: u32) -> bool {
+        let unit = self.nodes.unit_of(node);
+        if !self.is_paused(unit) {
+            self.stats.faults += 1;
+            self.failures.failed(unit, self.frame);
+        }
+        if self.nodes.residents.is_free(node, self.frame) {
+            self.let_go(node);
+        }
+        self.again.push(node);
+        false
+    }
+
     /// Asks for what a change needs, if there is room for it.
     fn request(&mut self, node: u32, change: Change, need: Need) -> bool {
         if self.first.is_some_and(|(first, _)| first != node && !self.groups.contains_key(&first)) {
             return false;
         }
         let mut members = vec![node];
-        if let Some(record) = self.residents.get(node) {
+        if let Some(record) = self.nodes.residents.get(node) {
             change.neighbours(record, |n| members.push(n));
         }
-        let missing: Vec<u32> = members.iter().copied().filter(|&n| !self.residents.contains(n)).collect();
-        let mut units: Vec<u32> = missing.iter().map(|&n| self.unit_of(n)).collect();
+        let missing: Vec<u32> =
+            members.iter().copied().filter(|&n| !self.nodes.residents.contains(n)).collect();
+        let mut units: Vec<u32> = missing.iter().map(|&n| self.nodes.unit_of(n)).collect();
         units.sort_unstable();
         units.dedup();
         if units.iter().any(|&unit| self.is_paused(unit)) {
@@ -263,45 +209,48 @@ impl Paging {
             return true;
         }
         for &n in &members {
-            self.residents.pin(n);
+            self.nodes.residents.pin(n);
         }
         if let Err(bytes) = self.reserve(&missing, need) {
             for &n in &members {
-                self.residents.unpin(n, 0);
+                self.nodes.residents.unpin(n, 0);
             }
             self.wanted = self.wanted.max(bytes);
             return false;
         }
-        let mut reads = 0;
         for &unit in &units {
-            reads += u32::from(self.ask(unit, NOW, Some(node)));
+            self.ask(unit, NOW, Some(node));
         }
-        self.groups.insert(node, Group { members, reads });
+        self.groups.insert(node, Group { members, reads: units.len() as u32 });
         true
     }
 
-    /// Asks for a partition or a node, or makes a request that is there more urgent. Says whether there will be an answer.
-    fn ask(&mut self, unit: u32, urgency: u64, waiting: Option<u32>) -> bool {
+    /// Asks for a partition or a node, or makes a request that is there more urgent.
+    fn ask(&mut self, unit: u32, urgency: u64, waiting: Option<u32>) {
         if let Some(read) = self.reads.get_mut(&unit) {
             // What a change waits for stays the most urgent.
             if read.waiting.is_empty() {
-                self.line.rank(&mut read.ticket, urgency);
+                self.requests.rank(read.ticket, urgency);
             }
-            read.is_ahead &= waiting.is_none();
+            if waiting.is_some() {
+                self.requests.demand(read.ticket);
+            }
             read.waiting.extend(waiting);
-            return true;
+            return;
         }
-        match self.line.ask(self.nodes_of(unit), urgency) {
-            Some(ticket) => {
-                let is_ahead = waiting.is_none();
-                self.reads.insert(unit, Read { ticket, waiting: waiting.into_iter().collect(), is_ahead });
-                true
-            }
-            None => {
-                self.is_lost = true;
-                false
-            }
+        let ticket = self.requests.ask(self.nodes.nodes_of(unit), urgency);
+        self.reads.insert(unit, Read { ticket, waiting: waiting.into_iter().collect() });
+    }
+
+    /// Takes back a read that is only foreseen and has not been started, and says whether it did.
+    fn withdraw(&mut self, unit: u32) -> bool {
+        let Some(read) = self.reads.get(&unit) else { return false };
+        if !read.waiting.is_empty() || !self.requests.withdraw(read.ticket) {
+            return false;
         }
+        self.reads.remove(&unit);
+        self.nodes.release(self.nodes.nodes_of(unit));
+        true
     }
 
     /// A change that was refused is not wanted any more: what only it waits for is not either.
@@ -310,8 +259,8 @@ impl Paging {
         self.first = self.first.filter(|&(first, _)| first != node);
         let Some(group) = self.groups.remove(&node) else { return };
         for member in group.members {
-            self.residents.unpin(member, 0);
-            let unit = self.unit_of(member);
+            self.nodes.residents.unpin(member, 0);
+            let unit = self.nodes.unit_of(member);
             let Some(read) = self.reads.get_mut(&unit) else { continue };
             let before = read.waiting.len();
             read.waiting.retain(|&other| other != node);
@@ -323,61 +272,115 @@ impl Paging {
 
     /// Whether something was read badly, and not long ago.
     fn is_paused(&self, unit: u32) -> bool {
-        self.failures.get(&unit).is_some_and(|&(_, from)| from > self.frame)
+        self.failures.rests(unit, self.frame)
+    }
+
+    /// Takes in what the store answers.
+    fn arrive(&mut self, arrival: Arrival<Stored>, arrived: &mut Vec<NodeId>) {
+        let Arrival { read: nodes, is_demanded, content } = arrival;
+        let unit = self.nodes.unit_of(nodes.start);
+        let waiting = self.reads.remove(&unit).map_or(Vec::new(), |read| read.waiting);
+        let mut is_whole = content.is_ok();
+        for (node, record) in nodes.clone().zip(content.unwrap_or_default()) {
+            let record = record.ok().filter(|record| self.nodes.fits_file(node, record));
+            let Some(record) = record else {
+                is_whole = false;
+                self.stats.faults += 1;
+                continue;
+            };
+            if self.nodes.take_in(node, record) {
+                if let Some(foresight) = self.foresight.as_mut().filter(|_| !is_demanded) {
+                    foresight.unused.insert(node);
+                }
+                self.brought.push(node);
+            }
+        }
+        for group in waiting.iter().filter_map(|waiting| self.groups.get(waiting)) {
+            let is_brought = |n: &&u32| self.brought.binary_search(n).is_ok();
+            group.members.iter().filter(is_brought).for_each(|&n| self.nodes.residents.pin(n));
+        }
+        self.brought.clear();
+        self.nodes.release(nodes);
+        if is_whole {
+            self.failures.forget(unit);
+        } else {
+            self.failures.failed(unit, self.frame);
+        }
+        for node in waiting {
+            let Some(group) = self.groups.get_mut(&node) else { continue };
+            group.reads -= 1;
+            if group.reads == 0 {
+                let members = self.groups.remove(&node).map(|group| group.members).unwrap_or_default();
+                for n in members {
+                    self.nodes.residents.unpin(n, self.frame);
+                }
+                arrived.push(NodeId(node));
+            }
+        }
+    }
+
+    // Changes that have been made.
+
+    /// A node in memory has been unfolded, and so have `above` before, or folded: it has so many arcs in the cut.
+    pub fn changed(&mut self, node: u32, change: Change, above: &[u32], below: &[u32], arcs: u32) {
+        let (gain, loss) = match change {
+            Change::Unfold => (below, above),
+            Change::Fold => (above, below),
+        };
+        self.nodes.changed(node, change, gain, loss, arcs);
+        // What of these was fetched ahead has been worth it.
+        if let Some(foresight) = self.foresight.as_mut().filter(|f| !f.unused.is_empty()) {
+            for n in std::iter::once(node).chain(gain.iter().copied()) {
+                self.stats.ahead_used += u64::from(foresight.used(n, &self.nodes));
+            }
+        }
     }
 
     // Frames.
 
     pub fn begin_frame(&mut self, arrived: &mut Vec<NodeId>) {
         self.frame += 1;
-        self.line.set_frame(self.frame);
         arrived.extend(self.again.drain(..).map(NodeId));
-        let mut answers = std::mem::take(&mut self.answers);
-        answers.extend(std::iter::from_fn(|| self.line.take()));
-        if let Some(foresight) = &mut self.foresight {
-            foresight.store.begin_frame(answers.len(), self.line.waiting().iter().sum());
+        let mut arrivals = std::mem::take(&mut self.arrivals);
+        self.requests.begin_frame(self.frame, &mut arrivals);
+        for arrival in arrivals.drain(..) {
+            self.arrive(arrival, arrived);
         }
-        for answer in answers.drain(..) {
-            self.arrive(answer, arrived);
-        }
-        self.answers = answers;
+        self.arrivals = arrivals;
     }
 
     /// Waits for all that has been asked for. Returns how long that took.
     pub fn settle(&mut self) -> Duration {
-        let answers = &mut self.answers;
-        self.line.settle(|answer| answers.push(answer))
-    }
-
-    /// Asks for everything that there is room for, and from now on lets go of nothing unless room is needed.
-    pub fn load_all(&mut self) {
-        self.keeps_all = true;
-        self.dirty.clear();
-        let units =
-            if self.mode.reads_partitions() { self.partitions.len() as u32 } else { self.file.nodes() };
-        for unit in 0..units {
-            let is_missing = |n: &u32| !self.residents.contains(*n) && !self.nodes[*n as usize].is_reserved;
-            let missing: Vec<u32> = self.nodes_of(unit).filter(is_missing).collect();
-            if self.is_paused(unit) || missing.is_empty() {
-                continue;
-            }
-            if !self.residents.memory().try_reserve(missing.iter().map(|&n| self.bytes_of(n)).sum()) {
-                return;
-            }
-            missing.iter().for_each(|&n| self.nodes[n as usize].is_reserved = true);
-            if !self.ask(unit, u64::MAX, None) {
-                self.release_reserved(unit);
-            }
-        }
+        self.requests.settle()
     }
 
     /// Lets time pass, where it is virtual.
     pub fn pass(&mut self, time: Duration) {
-        self.line.pass(time);
+        self.requests.pass(time);
+    }
+
+    /// Asks for everything that there is room for, and from now on lets go of nothing unless room is needed.
+    pub fn load_all(&mut self) {
+        self.nodes.keep_all();
+        for unit in 0..self.nodes.units() {
+            let nodes = &self.nodes;
+            let is_missing = |n: &u32| !nodes.residents.contains(*n) && !nodes.is_reserved(*n);
+            let missing: Vec<u32> = nodes.nodes_of(unit).filter(is_missing).collect();
+            if self.is_paused(unit) || missing.is_empty() {
+                continue;
+            }
+            if !nodes.residents.memory().try_reserve(nodes.unreserved_bytes(&missing)) {
+                return;
+            }
+            missing.iter().for_each(|&n| self.nodes.reserve(n));
+            self.ask(unit, u64::MAX, None);
+        }
     }
 
     pub fn end_frame(&mut self) -> PageStats {
-        self.foresee();
+        if let Some(foresight) = &mut self.foresight {
+            foresight.end_frame(self.frame, &mut self.nodes);
+        }
         // What found no room may have anything that is not needed at this moment.
         self.wanted = 0;
         // It does not ask while what it needs is on its way.
@@ -399,7 +402,7 @@ impl Paging {
             self.fetch_ahead();
         }
         if self.wanted > 0 || self.has_told {
-            self.residents.memory().want(self.member, self.wanted);
+            self.nodes.residents.memory().want(self.member, self.wanted);
             self.has_told = self.wanted > 0;
         }
         self.relieve();
@@ -408,17 +411,63 @@ impl Paging {
             self.unanswered_frames = 0;
             self.clean();
         }
-        let mut stats = std::mem::take(&mut self.stats);
-        stats.resident_bytes = self.residents.bytes();
-        stats
+        let resident_bytes = self.nodes.residents.bytes();
+        let resident = PageStats { resident_bytes, ..PageStats::default() };
+        std::mem::take(&mut self.stats) + self.requests.take_stats() + resident
+    }
+
+    /// Lets go of what the cache mode does not keep.
+    fn clean(&mut self) {
+        let mut gone = std::mem::take(&mut self.gone);
+        let foresight = &self.foresight;
+        let is_kept = |node: u32| foresight.as_ref().is_some_and(|f| f.keeps(node));
+        self.nodes.clean(self.frame, is_kept, &mut gone);
+        gone.drain(..).for_each(|node| self.let_go(node));
+        self.gone = gone;
+    }
+
+    // Foresight.
+
+    /// For how many frames ahead it is worth knowing what will be needed.
+    pub fn look_ahead(&self) -> u32 {
+        if self.foresight.is_some() { self.requests.look_ahead(LEAST_AHEAD) } else { 0 }
+    }
+
+    pub fn will_need(&mut self, node: u32, frames: u32) {
+        if let Some(foresight) = &mut self.foresight {
+            foresight.will_need(node, frames);
+        }
+    }
+
+    /// Asks for what is expected and not there, as far as there is room, and takes back what is not expected any more.
+    fn fetch_ahead(&mut self) {
+        let Some(foresight) = &self.foresight else { return };
+        let mut units = foresight.missing(&self.nodes);
+        if !self.nodes.keeps_all() {
+            let mut idle: Vec<u32> =
+                self.reads.iter().filter(|(_, r)| r.waiting.is_empty()).map(|(&u, _)| u).collect();
+            idle.sort_unstable();
+            for unit in idle {
+                if units.binary_search_by_key(&unit, |u| u.1).is_err() {
+                    self.withdraw(unit);
+                }
+            }
+        }
+        units.sort_unstable_by_key(|&(due, unit, _)| (due, unit));
+        for (due, unit, nodes) in units {
+            if self.is_paused(unit) {
+                continue;
+            }
+            if self.reserve(&nodes, Need::Foreseen(due)).is_err() {
+                break;
+            }
+            self.ask(unit, due, None);
+        }
     }
 }
 
 impl Drop for Paging {
     fn drop(&mut self) {
-        let is_reserved = |&n: &u32| self.nodes[n as usize].is_reserved;
-        let reserved = (0..self.file.nodes()).filter(is_reserved).map(|n| self.bytes_of(n)).sum();
-        self.residents.memory().release(reserved);
-        self.residents.memory().want(self.member, 0);
+        self.nodes.residents.memory().want(self.member, 0);
     }
 }

@@ -26,6 +26,7 @@ use std::io;
 
 use vertex_tree::{Bounds, NONE};
 
+use crate::bounds::holds;
 use crate::strips;
 
 const HEAD: usize = 52;
@@ -103,6 +104,13 @@ impl Draft<'_> {
         out[start..start + 4].copy_from_slice(&checksum.to_le_bytes());
         Ok(())
     }
+}
+
+/// A number that comes twice.
+fn doubled(numbers: impl Iterator<Item = u32>) -> Option<u32> {
+    let mut numbers: Vec<u32> = numbers.collect();
+    numbers.sort_unstable();
+    numbers.windows(2).find(|pair| pair[0] == pair[1]).map(|pair| pair[0])
 }
 
 /// Bytes of a corner.
@@ -194,6 +202,12 @@ impl Record {
         if let Some((node, _)) = self.above().find(|&(n, _)| !is_node(n)) {
             return Err(("node above", node.into()));
         }
+        if let Some(node) = doubled(self.above().map(|(n, _)| n)) {
+            return Err(("node twice above", node.into()));
+        }
+        if let Some(node) = doubled(self.arcs().map(|arc| arc.below)) {
+            return Err(("node twice below", node.into()));
+        }
         for i in 0..self.vertices {
             let (number, position) = self.vertex(i);
             if number >= limits.vertices {
@@ -230,6 +244,16 @@ impl Record {
             return Err(("triangles below a node", self.fine().into()));
         }
         Ok(())
+    }
+
+    /// Whether a record above this one and this one agree about the arc at a position among those that leave it: it is here that it
+    /// leads to, and layers and bounds are nested along it.
+    pub fn hangs_below(&self, above: &Self, position: u32) -> bool {
+        let arc = above.arcs().nth(position as usize);
+        arc.is_some_and(|arc| arc.below == self.number())
+            && self.above().any(|arc| arc == (above.number(), position))
+            && above.layer() < self.layer()
+            && holds(&above.bounds(), &self.bounds())
     }
 
     /// Starts to read bounds, layer and arcs into the cache: all of it that is not geometry, as far as it mostly goes.

@@ -18,6 +18,8 @@ struct Resident {
     stays: u64,
     /// Its place in the queue: earlier ones are out of date.
     stamp: u32,
+    /// Whether it has been compared with those above it, and with those below.
+    agrees: [bool; 2],
 }
 
 /// What a node takes in memory beyond its record.
@@ -84,11 +86,24 @@ impl Residents {
         self.all.get_mut(self.slots[node as usize] as usize)
     }
 
+    /// Whether a node has been compared with those above it, or with those below.
+    #[inline(always)]
+    pub fn has_agreed(&self, node: u32, below: bool) -> bool {
+        self.all.get(self.slots[node as usize] as usize).is_some_and(|r| r.agrees[usize::from(below)])
+    }
+
+    /// A node has been compared with those above it, or with those below.
+    pub fn agree(&mut self, node: u32, below: bool) {
+        if let Some(resident) = self.get_mut(node) {
+            resident.agrees[usize::from(below)] = true;
+        }
+    }
+
     /// Takes in a node of so many bytes, for which room has been reserved, and which is not in memory.
     pub fn insert(&mut self, node: u32, record: Record, bytes: u64) {
         self.slots[node as usize] = self.all.len() as u32;
         self.stamp = self.stamp.wrapping_add(1);
-        self.all.push(Resident { node, record, pins: 0, stays: 0, stamp: self.stamp });
+        self.all.push(Resident { node, record, pins: 0, stays: 0, stamp: self.stamp, agrees: [false; 2] });
         self.bytes += bytes;
         self.enqueue(node, self.stamp);
     }

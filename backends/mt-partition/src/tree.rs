@@ -6,9 +6,9 @@ use vertex_tree::{
     Bounds, Hierarchy, MeshSink, NONE, NodeId, PageStats, Prefetch, Step, TreeError, VertexId, VertexTree,
 };
 
-use super::error::MtError;
 use crate::cache::CacheMode;
 use crate::display::Display;
+use crate::error::MtError;
 use crate::file::MtFile;
 use crate::memory::Memory;
 use crate::paging::{Change, Paging};
@@ -50,17 +50,16 @@ impl MtTree {
     /// A tree with every node folded.
     ///
     /// # Errors
-    /// [`MtError::Memory`] if the budget is below [`MtFile::least_memory`], [`MtError::Io`] if a thread can not be had.
+    /// [`MtError::Memory`] if the budget is below [`MtFile::least_memory`], [`MtError::Thread`] if a thread can not be had.
     pub fn new(file: Arc<MtFile>, settings: Settings) -> Result<Self, MtError> {
         let Settings { cache, memory, reader, prefetch } = settings;
         let (allowed, needed) = (memory.limit(), file.least_memory());
         if allowed < needed {
             return Err(MtError::Memory { allowed, needed });
         }
-        let thread = |source| MtError::Io { file: file.name().to_owned(), offset: 0, length: 0, source };
-        let reader = reader.map_or_else(|| Reader::new().map_err(thread), Ok)?;
+        let reader = reader.map_or_else(Reader::new, Ok)?;
         Ok(Self {
-            paging: Paging::new(file.clone(), cache, prefetch, memory.clone(), reader),
+            paging: Paging::new(file.clone(), cache, prefetch, memory.clone(), &reader),
             memory,
             display: None,
             displayed: u64::from(file.base.fine()),
@@ -85,7 +84,7 @@ impl MtTree {
     /// Bytes of the nodes in memory.
     #[must_use]
     pub fn node_bytes(&self) -> u64 {
-        self.paging.residents.bytes()
+        self.paging.nodes.residents.bytes()
     }
 
     /// Asks for all nodes, as far as there is room for them, and lets go of nothing from now on unless room is needed,
@@ -103,7 +102,7 @@ impl MtTree {
     /// A change of the front that has been made: the cut and the count of triangles follow. Returns the arcs above and
     /// below.
     fn change(&mut self, node: u32, change: Change) {
-        let Some(record) = self.paging.residents.get(node) else { return };
+        let Some(record) = self.paging.nodes.residents.get(node) else { return };
         let (coarse, fine) = (u64::from(record.coarse()), u64::from(record.fine()));
         self.above.clear();
         self.above.extend(record.above().map(|(n, _)| n));
@@ -127,14 +126,6 @@ impl MtTree {
         };
         self.paging.changed(node, change, &self.above, &self.below, arcs as u32);
     }
-
-    fn check_reader(&self) -> Result<(), TreeError> {
-        if !self.paging.is_lost {
-            return Ok(());
-        }
-        let source = std::io::Error::other("the thread that reads has ended");
-        Err(TreeError::Read { file: self.file.name().to_owned(), offset: 0, length: 0, source })
-    }
 }
 
 impl Hierarchy for MtTree {
@@ -157,7 +148,7 @@ impl Hierarchy for MtTree {
     }
 
     fn bounds(&self, node: NodeId) -> Bounds {
-        let record = || self.paging.residents.get(node.0).map(Record::bounds);
+        let record = || self.paging.nodes.residents.get(node.0).map(Record::bounds);
         // Asked of nothing but roots and what is in memory.
         record().or_else(|| self.file.root_bounds(node)).unwrap_or(Bounds {
             center: [0.0; 3],
@@ -168,12 +159,12 @@ impl Hierarchy for MtTree {
 
     #[inline]
     fn children(&self, node: NodeId) -> impl Iterator<Item = NodeId> {
-        self.paging.residents.get(node.0).into_iter().flat_map(|record| record.below().map(NodeId))
+        self.paging.nodes.residents.get(node.0).into_iter().flat_map(|record| record.below().map(NodeId))
     }
 
     #[inline]
     fn parents(&self, node: NodeId) -> impl Iterator<Item = NodeId> {
-        let record = self.paging.residents.get(node.0);
+        let record = self.paging.nodes.residents.get(node.0);
         record
             .into_iter()
             .flat_map(|record| record.above().map(|(n, _)| n).filter(|&n| n != NONE).map(NodeId))
@@ -184,7 +175,7 @@ impl Hierarchy for MtTree {
         &self,
         node: NodeId,
     ) -> impl Iterator<Item = (NodeId, Bounds, impl Iterator<Item = NodeId>)> {
-        let residents = &self.paging.residents;
+        let residents = &self.paging.nodes.residents;
         residents.get(node.0).into_iter().flat_map(Record::below).filter_map(|below| {
             let child = residents.get(below)?;
             let parents = child.above().map(|(n, _)| n).filter(|&n| n != NONE).map(NodeId);
@@ -212,11 +203,11 @@ impl Hierarchy for MtTree {
     /// A child is shown below the first of its parents that is folded: once, however many parents it has. Of the
     /// children, those that are in memory are shown.
     fn peek(&self, node: NodeId, children: &mut Vec<(NodeId, Bounds)>) -> bool {
-        let Some(record) = self.paging.residents.get(node.0) else { return false };
+        let Some(record) = self.paging.nodes.residents.get(node.0) else { return false };
         for below in record.below() {
-            let Some(child) = self.paging.residents.get(below) else { continue };
+            let Some(child) = self.paging.nodes.residents.get(below) else { continue };
             let mut folded =
-                child.above().map(|(n, _)| n).filter(|&n| n != NONE && !self.paging.is_active(n));
+                child.above().map(|(n, _)| n).filter(|&n| n != NONE && !self.paging.nodes.is_active(n));
             if folded.next() == Some(node.0) {
                 children.push((NodeId(below), child.bounds()));
             }
@@ -226,12 +217,12 @@ impl Hierarchy for MtTree {
 
     fn pass(&mut self, time: std::time::Duration) -> Result<(), TreeError> {
         self.paging.pass(time);
-        self.check_reader()
+        Ok(())
     }
 
     fn begin_frame(&mut self, arrived: &mut Vec<NodeId>) -> Result<(), TreeError> {
         self.paging.begin_frame(arrived);
-        self.check_reader()
+        Ok(())
     }
 
     fn give_up(&mut self, node: NodeId) {
@@ -239,8 +230,7 @@ impl Hierarchy for MtTree {
     }
 
     fn settle(&mut self) -> Result<std::time::Duration, TreeError> {
-        let waited = self.paging.settle();
-        self.check_reader().map(|()| waited)
+        Ok(self.paging.settle())
     }
 
     fn end_frame(&mut self) -> Result<PageStats, TreeError> {
@@ -264,7 +254,7 @@ impl VertexTree for MtTree {
         }
         self.change(node.0, Change::Unfold);
         if let (true, Some(display), Some(record)) =
-            (M::KEEPS_MESH, &mut self.display, self.paging.residents.get(node.0))
+            (M::KEEPS_MESH, &mut self.display, self.paging.nodes.residents.get(node.0))
         {
             // What appears first shares vertices with what disappears then.
             display.show(record, |_, _| true, mesh);
@@ -281,11 +271,14 @@ impl VertexTree for MtTree {
         }
         self.change(node.0, Change::Fold);
         if let (true, Some(display), Some(record)) =
-            (M::KEEPS_MESH, &mut self.display, self.paging.residents.get(node.0))
+            (M::KEEPS_MESH, &mut self.display, self.paging.nodes.residents.get(node.0))
         {
             for (above, position) in record.above() {
-                let parent =
-                    if above == NONE { Some(&self.file.base) } else { self.paging.residents.get(above) };
+                let parent = if above == NONE {
+                    Some(&self.file.base)
+                } else {
+                    self.paging.nodes.residents.get(above)
+                };
                 if let Some(parent) = parent {
                     display.show(parent, |at, below| at == position as usize && below == node.0, mesh);
                 }

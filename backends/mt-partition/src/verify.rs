@@ -2,8 +2,8 @@
 
 use vertex_tree::NONE;
 
-use crate::MtError;
 use crate::bounds::holds;
+use crate::error::MtError;
 use crate::file::MtFile;
 use crate::record::Record;
 
@@ -39,8 +39,9 @@ impl MtFile {
         let range =
             |offset, what, value| MtError::Range { file: self.name().to_owned(), offset, what, value };
         let mut seen: Vec<Seen> = Vec::with_capacity(nodes as usize);
+        let mut buffer = Vec::new();
         for pair in self.partitions.windows(2) {
-            for (node, record) in (pair[0]..pair[1]).zip(self.read(pair[0]..pair[1])?) {
+            for (node, record) in (pair[0]..pair[1]).zip(self.read(pair[0]..pair[1], &mut buffer)?) {
                 let record = record?;
                 let is_root = record.above().all(|(above, _)| above == NONE);
                 if is_root != self.root_bounds(vertex_tree::NodeId(node)).is_some()

@@ -53,14 +53,19 @@ impl LeafMap {
         self.len
     }
 
+    /// A leaf is shown at a vertex. Returns whether it was not shown before; if it was, nothing changes.
     #[inline(always)]
-    pub fn insert(&mut self, leaf: u32, vertex: u32) {
+    pub fn insert(&mut self, leaf: u32, vertex: u32) -> bool {
         if 4 * (self.len + 1) > self.entries.len() {
             self.grow();
         }
         let at = self.find(leaf);
-        self.len += usize::from(self.entries[at][0] == NONE);
-        self.entries[at] = [leaf, vertex];
+        let is_new = self.entries[at][0] == NONE;
+        if is_new {
+            self.len += 1;
+            self.entries[at] = [leaf, vertex];
+        }
+        is_new
     }
 
     #[inline(always)]
@@ -116,8 +121,8 @@ mod tests {
                     map.remove(leaf);
                     model.remove(&leaf);
                 } else {
-                    map.insert(leaf, step);
-                    model.insert(leaf, step);
+                    assert_eq!(map.insert(leaf, step), !model.contains_key(&leaf));
+                    model.entry(leaf).or_insert(step);
                 }
                 let probe = ((state >> 13) % range) as u32;
                 assert_eq!(map.get(probe), model.get(&probe).copied().unwrap_or(NONE));

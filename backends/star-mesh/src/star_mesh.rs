@@ -48,6 +48,8 @@ pub struct StarMesh {
     /// What is to be followed, and the triangles that come with it.
     changes: Vec<Change>,
     coming: Vec<LeafTriangle>,
+    /// The removed leaf of a change that did not fit.
+    misfit: Option<u32>,
 }
 
 /// Slots may be empty up to one in so many, and a few: then triangles at the end move into them.
@@ -66,6 +68,7 @@ impl StarMesh {
             displayed: 0,
             changes: Vec::new(),
             coming: Vec::new(),
+            misfit: None,
         }
     }
 
@@ -73,6 +76,12 @@ impl StarMesh {
     #[must_use]
     pub fn displayed(&self) -> usize {
         self.displayed
+    }
+
+    /// The removed leaf of a change since the last call that did not fit what was displayed: a vertex came that was there, or went that
+    /// was not. Such a change is left out. What is displayed then is not what the hierarchy says, but nothing else is wrong with it.
+    pub fn take_misfit(&mut self) -> Option<u32> {
+        self.misfit.take()
     }
 
     /// The leaf shown in a slot of the vertices; [`NONE`] in a hole.
@@ -101,13 +110,21 @@ impl StarMesh {
     }
 
     /// A vertex of the base mesh appears.
-    #[inline(always)]
     pub fn add_vertex<M: MeshSink>(&mut self, leaf: u32, position: [f32; 3], mesh: &mut M) -> VertexId {
+        self.show_vertex(leaf, position, mesh).unwrap_or_else(|| self.vertex_of_leaf.get(leaf))
+    }
+
+    /// A leaf is shown at a vertex of its own; `None` if it was before.
+    #[inline(always)]
+    fn show_vertex<M: MeshSink>(&mut self, leaf: u32, position: [f32; 3], mesh: &mut M) -> Option<VertexId> {
         let vertex = self.stars.add(leaf);
+        if !self.vertex_of_leaf.insert(leaf, vertex) {
+            self.stars.remove(vertex);
+            return None;
+        }
         self.shown.insert(leaf);
-        self.vertex_of_leaf.insert(leaf, vertex);
         mesh.vertex_added(vertex, position);
-        vertex
+        Some(vertex)
     }
 
     /// A triangle of the base mesh appears, between vertices that are shown.
@@ -157,7 +174,10 @@ impl StarMesh {
         brought: &[LeafTriangle],
         mesh: &mut M,
     ) {
-        let to = self.add_vertex(removed, position, mesh);
+        let Some(to) = self.show_vertex(removed, position, mesh) else {
+            self.misfit = self.misfit.or(Some(removed));
+            return;
+        };
         let triangles = &mut self.triangles;
         let moves =
             |corner: Corner| triangles[corner.triangle() as usize].leaves[corner.index() % 3] >= removed;
@@ -184,7 +204,7 @@ impl StarMesh {
     #[inline(always)]
     fn merge_vertex<M: MeshSink>(&mut self, to: VertexId, from: VertexId, removed: u32, mesh: &mut M) {
         for at in 0..self.stars.brought(from).len() {
-            self.remove_brought(self.stars.brought(from)[at], from, to, mesh);
+            self.remove_brought(self.stars.brought(from)[at], mesh);
         }
         let triangles = &mut self.triangles;
         self.stars.merge(from, to, |corner| {
@@ -200,13 +220,11 @@ impl StarMesh {
         }
     }
 
-    /// A triangle that came with vertex `from` disappears, before that is merged into `to`.
+    /// A triangle that came with a vertex disappears, before that is merged into another.
     #[inline(always)]
-    fn remove_brought<M: MeshSink>(&mut self, slot: TriangleId, from: VertexId, to: VertexId, mesh: &mut M) {
+    fn remove_brought<M: MeshSink>(&mut self, slot: TriangleId, mesh: &mut M) {
         let triangle = std::mem::replace(&mut self.triangles[slot as usize], Triangle::HOLE);
-        // The third corner is neither here nor there.
-        let far = triangle.vertices.into_iter().fold(from ^ to, |all, vertex| all ^ vertex);
-        for vertex in [from, to, far] {
+        for vertex in triangle.vertices {
             self.stars.take(vertex, slot);
         }
         self.holes.push(slot);

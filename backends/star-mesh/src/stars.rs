@@ -200,9 +200,9 @@ impl Stars {
         std::array::from_fn(|at| star.near[at])
     }
 
-    /// The corners at a vertex.
+    /// The corners at a vertex; none where there is no vertex.
     pub fn corners(&self, slot: VertexId) -> &[Corner] {
-        let star = &self.stars[slot as usize];
+        let Some(star) = self.stars.get(slot as usize) else { return &[] };
         match star.near.get(..star.count as usize) {
             Some(near) => near,
             None => &self.far.lists[star.near[0].0 as usize],

@@ -12,7 +12,7 @@ use crate::paging::PageStats;
 
 /// Number of an inner node in a backend's own numbering, less than [`Hierarchy::node_limit`].
 ///
-/// The engine keeps flat arrays indexed by it where nodes have several parents, in memory that is not touched before it is used, so numbers should
+/// The engine keeps a bit for each number and tables of the neighbourhoods in play where nodes have several parents, so numbers should
 /// be dense, and nodes that are visited together should have numbers that are close: depth-first order is good.
 ///
 /// 32 bits are enough for 4,294,967,294 nodes that can be unfolded: as collapses, for a mesh of 8.6 thousand million triangles; as
@@ -129,8 +129,7 @@ pub trait Hierarchy {
     }
     /// For how many frames ahead the engine shall foresee what changes, and say so through
     /// [`will_need`](Self::will_need): at least as many as it takes to fetch a page; 0 for not at all, or while what
-    /// refused changes wait for takes longer than anybody looks ahead (see [`LookAhead`](crate::LookAhead)). Asked in every frame, as a store may be
-    /// slow for a while.
+    /// refused changes wait for takes longer than anybody looks ahead. Asked in every frame, as a store may be slow for a while.
     fn look_ahead(&self) -> u32 {
         0
     }
@@ -147,7 +146,7 @@ pub trait Hierarchy {
         let _ = (node, children);
         false
     }
-    /// Lets time pass for a store on virtual time, see [`simulated`](crate::simulated): called between frames by
+    /// Lets time pass for a store on virtual time: called between frames by
     /// whoever plays the clock. What has arrived by then is there in the next [`begin_frame`](Self::begin_frame).
     ///
     /// # Errors

@@ -16,18 +16,14 @@
 mod bounds;
 mod error;
 mod hierarchy;
-mod look_ahead;
 mod paging;
 mod prefetch;
-pub mod simulated;
 mod sink;
-pub mod source;
 mod tree;
 
 pub use bounds::{Bounds, NormalCone};
 pub use error::TreeError;
 pub use hierarchy::{Hierarchy, NodeId, Refine, Step};
-pub use look_ahead::LookAhead;
 pub use paging::{PageStats, Prefetch};
 pub use prefetch::prefetch;
 pub use sink::{MeshSink, NONE, NullSink, TriangleId, VertexId};

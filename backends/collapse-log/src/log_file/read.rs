@@ -5,8 +5,8 @@ use std::io::{self, BufReader, Read, Seek, SeekFrom};
 use std::path::Path;
 
 use container::{Georeference, Kind, SectionError, Sections};
+use page_store::source::{FileSource, PageSource};
 use vertex_tree::Bounds;
-use vertex_tree::source::{FileSource, PageSource};
 
 use super::error::LogFileError;
 use super::layout::{

@@ -3,7 +3,7 @@
 use std::sync::Arc;
 
 use detail_block::{Arrangement, FileError, MAGIC, XfmError, XfmFile, XfmTree};
-use vertex_tree::source::MemorySource;
+use page_store::source::MemorySource;
 use vertex_tree::{Hierarchy, MeshSink, NodeId, Step, TriangleId, VertexId, VertexTree};
 
 use crate::driver::bytes_of;

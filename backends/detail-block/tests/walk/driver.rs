@@ -5,7 +5,7 @@ use std::sync::Arc;
 
 use collapse_log::CollapseLog;
 use detail_block::{Arrangement, Settings, XfmFile, XfmTree};
-use vertex_tree::source::MemorySource;
+use page_store::source::MemorySource;
 use vertex_tree::{Hierarchy, MeshSink, NodeId, Step, TreeError, TriangleId, VertexId, VertexTree};
 
 /// Keeps the displayed mesh and holds the tree to the order of calls that is promised.

@@ -6,8 +6,8 @@ use std::sync::Arc;
 use std::time::Duration;
 
 use detail_block::{BuildOptions, Io, Settings, XfmFile};
-use vertex_tree::simulated::Simulated;
-use vertex_tree::source::{Faults, Faulty, MemorySource};
+use page_store::Simulated;
+use page_store::source::{Faults, Faulty, MemorySource};
 use vertex_tree::{Hierarchy, NodeId, PageStats, Prefetch, Step, VertexTree};
 
 use crate::driver::{Driver, open};

@@ -7,7 +7,7 @@ use std::sync::atomic::AtomicBool;
 use collapse_log::{Collapse, CollapseLog, LogCounts, LogSource, Mesh, Records};
 use container::Georeference;
 use detail_block::{
-    Arrangement, BuildOptions, Workspace, WorkspaceError, XfmError, needed_bytes, write_within,
+    Arrangement, BuildOptions, FileError, Workspace, WorkspaceError, XfmError, needed_bytes, write_within,
 };
 
 use crate::driver::bytes_of;
@@ -144,7 +144,7 @@ fn what_fails_is_named_and_leaves_nothing() {
     let outcome = write_within(&path, &log, &options, &interrupted);
     assert!(matches!(outcome, Err(XfmError::Workspace(WorkspaceError::Interrupted))), "{outcome:?}");
     let outcome = write_within(&nowhere.folder.join("file"), &log, &options, &workspace);
-    assert!(matches!(outcome, Err(XfmError::Write { .. })), "{outcome:?}");
+    assert!(matches!(outcome, Err(XfmError::File(FileError::Write { .. }))), "{outcome:?}");
     let mut wrong = log.clone();
     wrong.collapses[700].kept = wrong.collapses[600].removed;
     let outcome = write_within(&path, &wrong, &options, &workspace);

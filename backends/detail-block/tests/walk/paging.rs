@@ -5,8 +5,8 @@ use std::time::Duration;
 
 use collapse_log::CollapseLog;
 use detail_block::{ATTEMPTS, Arrangement, BuildOptions, Io, Settings, XfmFile};
-use vertex_tree::simulated::Simulated;
-use vertex_tree::source::{Faults, Faulty, MemorySource};
+use page_store::Simulated;
+use page_store::source::{Faults, Faulty, MemorySource};
 use vertex_tree::{Hierarchy, NodeId};
 
 use crate::driver::{Driver, bytes_of, open};

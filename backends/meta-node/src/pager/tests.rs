@@ -3,8 +3,8 @@
 use std::sync::Arc;
 use std::time::Duration;
 
-use vertex_tree::simulated::Simulated;
-use vertex_tree::source::MemorySource;
+use page_store::Simulated;
+use page_store::source::MemorySource;
 use vertex_tree::{NONE, Prefetch};
 
 use super::Pager;
@@ -39,7 +39,7 @@ fn frame(pager: &mut Pager) -> u64 {
         pager.settle();
         pager.begin_frame();
         pager.assert_well_formed();
-        let came = pager.stats.reads;
+        let came = pager.requests.take_stats().reads;
         reads += came;
         if came == 0 {
             return reads;
@@ -48,16 +48,16 @@ fn frame(pager: &mut Pager) -> u64 {
 }
 
 fn layout(pager: &Pager, page: u32) -> Layout {
-    pager.holders[pager.find(page).unwrap() as usize].layout
+    pager.places.holders[pager.find(page).unwrap() as usize].layout
 }
 
 fn class(pager: &Pager, page: u32) -> Option<Class> {
-    pager.lists.class(pager.find(page)?)
+    pager.places.lists.class(pager.find(page)?)
 }
 
 /// The pages on the free list, in order.
 fn free(pager: &Pager) -> Vec<u32> {
-    pager.lists.iter(Class::Free).map(|holder| pager.holders[holder as usize].page).collect()
+    pager.places.lists.iter(Class::Free).map(|holder| pager.places.holders[holder as usize].page).collect()
 }
 
 /// A page that is not kept, with pages below it and one above it that is not kept either.
@@ -178,14 +178,14 @@ fn leaves(pager: &Pager) -> Vec<u32> {
 fn as_printed_three_place_holders_are_kept_from_switching_down() {
     let mut pager = pager(InUse::Printed, Prefetch::None);
     let largest = u64::from(pager.file.header.largest_words);
-    let holders = pager.allowed / largest;
+    let holders = pager.places.allowed / largest;
     assert!(holders < u64::from(pager.file.header.pages), "{holders}");
     let mut in_use = Vec::new();
     let mut refused = None;
     for page in leaves(&pager) {
         pager.urge(page, super::Switch::Down);
         frame(&mut pager);
-        assert!(pager.taken.is_multiple_of(largest) && pager.taken <= pager.allowed);
+        assert!(pager.places.taken.is_multiple_of(largest) && pager.places.taken <= pager.places.allowed);
         if pager.find(page).is_none() {
             refused = Some(page);
             break;

@@ -6,7 +6,7 @@ use std::sync::Arc;
 
 use collapse_log::{Collapse, CollapseLog, Mesh};
 use meta_node::{BuildOptions, MetaNodeError, MetaNodeFile, MetaNodeTree};
-use vertex_tree::source::MemorySource;
+use page_store::source::MemorySource;
 use vertex_tree::{Bounds, Hierarchy, NodeId, NullSink, Step, VertexTree};
 
 /// A small generator with a fixed sequence.

@@ -7,14 +7,10 @@
 
 use std::collections::VecDeque;
 
+use super::change::Change;
+use super::nodes::Nodes;
 use rustc_hash::{FxHashMap, FxHashSet};
-use vertex_tree::LookAhead;
 
-use super::room::Need;
-use super::{Change, Paging};
-
-/// Frames of foresight, at least.
-const LEAST: u32 = 2;
 /// For how many frames something that was named is kept.
 const KEPT: u64 = 60;
 
@@ -40,8 +36,6 @@ pub(super) struct Foresight {
     expiring: VecDeque<(u64, u32)>,
     /// What was fetched ahead and no change has used yet.
     pub unused: FxHashSet<u32>,
-    /// What is known of the store.
-    pub store: LookAhead,
 }
 
 impl Foresight {
@@ -65,6 +59,11 @@ impl Foresight {
         Some(node)
     }
 
+    /// A node is expected to change in so many frames.
+    pub fn will_need(&mut self, node: u32, frames: u32) {
+        self.naming.push((node, frames));
+    }
+
     fn name(&mut self, node: u32, due: u64) {
         let frame = self.frame;
         let expected = self.expected.entry(node).or_insert(Expected { due, named: 0 });
@@ -75,72 +74,51 @@ impl Foresight {
             self.named.push(node);
         }
     }
-}
 
-impl Paging {
-    /// For how many frames ahead it is worth knowing what will be needed.
-    pub fn look_ahead(&self) -> u32 {
-        let Some(foresight) = &self.foresight else { return 0 };
-        let [missed, _] = self.line.waiting();
-        foresight.store.frames(missed, LEAST)
-    }
-
-    pub fn will_need(&mut self, node: u32, frames: u32) {
-        if let Some(foresight) = &mut self.foresight {
-            foresight.naming.push((node, frames));
-        }
-    }
-
-    /// Takes note of what was named in this frame.
-    pub(super) fn foresee(&mut self) {
-        let Some(foresight) = &mut self.foresight else { return };
-        let before = std::mem::take(&mut foresight.named);
-        foresight.frame = self.frame;
-        let mut naming = std::mem::take(&mut foresight.naming);
+    /// A frame ends: takes note of what was named in it.
+    pub fn end_frame(&mut self, frame: u64, nodes: &mut Nodes) {
+        let before = std::mem::take(&mut self.named);
+        self.frame = frame;
+        let mut naming = std::mem::take(&mut self.naming);
         for (node, frames) in naming.drain(..) {
-            let due = self.frame + u64::from(frames);
-            foresight.name(node, due);
-            let change = if self.nodes[node as usize].is_active { Change::Fold } else { Change::Unfold };
-            if let Some(record) = self.residents.get(node) {
-                change.neighbours(record, |n| foresight.name(n, due));
+            let due = frame + u64::from(frames);
+            self.name(node, due);
+            let change = if nodes.is_active(node) { Change::Fold } else { Change::Unfold };
+            if let Some(record) = nodes.residents.get(node) {
+                change.neighbours(record, |n| self.name(n, due));
             }
         }
-        foresight.naming = naming;
+        self.naming = naming;
         for node in before {
-            if !foresight.is_named(node) {
+            if !self.is_named(node) {
                 // From now on it goes when its turn comes.
-                self.residents.touch(node);
-                foresight.expiring.push_back((self.frame + KEPT, node));
+                nodes.residents.touch(node);
+                self.expiring.push_back((frame + KEPT, node));
             }
         }
-        let Foresight { named, expected, .. } = foresight;
+        let Self { named, expected, .. } = self;
         named.sort_by_cached_key(|n| (expected.get(n).map(|e| e.due), *n));
-        foresight.farthest = foresight.named.len();
-        let mut gone = Vec::new();
-        while foresight.expiring.front().is_some_and(|&(frame, _)| frame <= self.frame) {
-            let Some((_, node)) = foresight.expiring.pop_front() else { break };
-            let is_over = |e: &Expected| e.named + KEPT <= self.frame;
-            if foresight.expected.get(&node).is_some_and(is_over) {
-                foresight.expected.remove(&node);
-                gone.push(node);
+        self.farthest = self.named.len();
+        while self.expiring.front().is_some_and(|&(until, _)| until <= frame) {
+            let Some((_, node)) = self.expiring.pop_front() else { break };
+            let is_over = |e: &Expected| e.named + KEPT <= frame;
+            if self.expected.get(&node).is_some_and(is_over) {
+                self.expected.remove(&node);
+                nodes.mark_of(node);
             }
-        }
-        for node in gone {
-            self.mark(self.nodes[node as usize].partition);
         }
     }
 
-    /// Asks for what is expected and not there, as far as there is room, and takes back what is not expected any more.
-    pub(super) fn fetch_ahead(&mut self) {
-        let Some(foresight) = &self.foresight else { return };
+    /// What was named in the frame that has ended and is not in memory: when it is needed, what is read to get it, in the order of
+    /// that, and which nodes.
+    pub fn missing(&self, nodes: &Nodes) -> Vec<(u64, u32, Vec<u32>)> {
         let mut missing: Vec<(u64, u32, u32)> = Vec::new();
-        for &node in &foresight.named {
-            if !self.residents.contains(node) {
-                let due = foresight.expected.get(&node).map_or(self.frame, |e| e.due);
-                missing.push((due, self.unit_of(node), node));
+        for &node in &self.named {
+            if !nodes.residents.contains(node) {
+                let due = self.expected.get(&node).map_or(self.frame, |e| e.due);
+                missing.push((due, nodes.unit_of(node), node));
             }
         }
-        // By what is read, the earliest frame; then in order of these.
         missing.sort_unstable_by_key(|&(due, unit, node)| (unit, due, node));
         let mut units: Vec<(u64, u32, Vec<u32>)> = Vec::new();
         for (due, unit, node) in missing {
@@ -149,44 +127,18 @@ impl Paging {
                 None => units.push((due, unit, vec![node])),
             }
         }
-        let mut idle: Vec<u32> =
-            self.reads.iter().filter(|(_, r)| r.waiting.is_empty()).map(|(&u, _)| u).collect();
-        idle.sort_unstable();
-        for unit in idle {
-            if !self.keeps_all && units.binary_search_by_key(&unit, |u| u.1).is_err() {
-                self.withdraw(unit);
-            }
-        }
-        units.sort_unstable_by_key(|&(due, unit, _)| (due, unit));
-        for (due, unit, nodes) in units {
-            if self.is_paused(unit) {
-                continue;
-            }
-            if self.reserve(&nodes, Need::Foreseen(due)).is_err() {
-                break;
-            }
-            if !self.ask(unit, due, None) {
-                self.release_reserved(unit);
-            }
-        }
+        units
     }
 
-    /// A change has used a node and its neighbours: what of these was fetched ahead has been worth it.
-    pub(super) fn count_use(&mut self, node: u32, neighbours: &[u32]) {
-        if self.foresight.as_ref().is_none_or(|f| f.unused.is_empty()) {
-            return;
+    /// A change has used a node: if it was fetched ahead, that has been worth it, with all that came with it. Says whether
+    /// it was.
+    pub fn used(&mut self, node: u32, nodes: &Nodes) -> bool {
+        if !self.unused.contains(&node) {
+            return false;
         }
-        for n in std::iter::once(node).chain(neighbours.iter().copied()) {
-            let unit = self.unit_of(n);
-            let nodes = self.nodes_of(unit);
-            let Some(foresight) = &mut self.foresight else { return };
-            if foresight.unused.contains(&n) {
-                // With it, all that came with it.
-                nodes.for_each(|n| {
-                    foresight.unused.remove(&n);
-                });
-                self.stats.ahead_used += 1;
-            }
+        for other in nodes.nodes_of(nodes.unit_of(node)) {
+            self.unused.remove(&other);
         }
+        true
     }
 }

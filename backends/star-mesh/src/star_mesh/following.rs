@@ -122,9 +122,16 @@ impl StarMesh {
             vertex if self.stars.shows(vertex, leaves[side]) => vertex,
             _ => self.vertex_of_leaf.get(leaves[side]),
         };
+        let kept = vertex(0);
         match position {
-            Some(position) => self.split_vertex(vertex(0), leaves[1], position, brought, mesh),
-            None => self.merge_vertex(vertex(0), vertex(1), leaves[1], mesh),
+            Some(position) if kept != NONE => self.split_vertex(kept, leaves[1], position, brought, mesh),
+            None if kept != NONE => match vertex(1) {
+                removed if removed != NONE && removed != kept => {
+                    self.merge_vertex(kept, removed, leaves[1], mesh);
+                }
+                _ => self.misfit = self.misfit.or(Some(leaves[1])),
+            },
+            _ => self.misfit = self.misfit.or(Some(leaves[1])),
         }
     }
 }

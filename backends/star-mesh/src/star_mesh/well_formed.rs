@@ -14,6 +14,7 @@ impl StarMesh {
     #[track_caller]
     pub fn assert_well_formed(&self) {
         assert_eq!(self.changes.len(), 0, "changes that the mesh has not followed");
+        assert_eq!(self.misfit, None, "a change that did not fit");
         self.stars.assert_well_formed();
         let mut shown = 0;
         for (vertex, leaf) in self.stars.leaves() {

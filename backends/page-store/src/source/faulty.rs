@@ -2,7 +2,7 @@ use std::io;
 use std::sync::atomic::{AtomicU64, Ordering};
 use std::time::Duration;
 
-use super::PageSource;
+use super::page_source::PageSource;
 
 /// How often a [`Faulty`] source does what, in reads out of 1000, each by itself.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]

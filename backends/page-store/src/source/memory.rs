@@ -1,7 +1,7 @@
 use std::io;
 use std::sync::Arc;
 
-use super::{PageSource, copy_from};
+use super::page_source::{PageSource, copy_from};
 
 /// Bytes in memory: for tests, and for stores that arrive over a network as a whole.
 #[derive(Clone, Debug)]

@@ -4,7 +4,7 @@ use std::path::Path;
 
 use memmap2::Mmap;
 
-use super::{PageSource, copy_from};
+use super::page_source::{PageSource, copy_from};
 
 /// A file mapped into memory: no system call a read, and a page fault where the page cache does not have it.
 #[derive(Debug)]

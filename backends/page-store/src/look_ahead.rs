@@ -21,7 +21,7 @@ const FADING: f64 = 0.97;
 
 /// Measures a store.
 #[derive(Clone, Copy, Debug, Default)]
-pub struct LookAhead {
+pub(crate) struct LookAhead {
     /// The most frames from the start of a read to its arrival lately.
     slowest: f64,
     /// Reads that have come in frames in which others waited, and such frames; older ones count less.
@@ -52,7 +52,6 @@ impl LookAhead {
 
     /// For how many frames ahead to look, at least `least`; 0 for not at all. So many requests of refused changes wait for
     /// their turn.
-    #[must_use]
     pub fn frames(&self, missed: usize, least: u32) -> u32 {
         if self.answering(missed) > f64::from(MOST) {
             return 0;

@@ -1,24 +1,6 @@
-//! Where pages come from: random access to the bytes of a store, behind a trait small enough to be implemented by
-//! anything.
-//!
-//! A backend reads through [`PageSource`] alone, so a file, a memory-mapped file, bytes in memory, a slow store and a
-//! failing one are interchangeable. [`Counted`] counts reads and bytes, whatever it wraps.
-
-mod counted;
-mod faulty;
-mod file;
-mod mapped;
-mod memory;
-mod throttled;
+//! What a store of bytes must be able to do.
 
 use std::io;
-
-pub use counted::Counted;
-pub use faulty::{Faults, Faulty};
-pub use file::FileSource;
-pub use mapped::MappedSource;
-pub use memory::MemorySource;
-pub use throttled::Throttled;
 
 /// A store that is read by position. Shared between threads: reads may be under way at the same time.
 pub trait PageSource: Send + Sync {
@@ -66,7 +48,7 @@ impl<S: PageSource + ?Sized> PageSource for Box<S> {
 }
 
 /// Copies from bytes that are all in memory.
-fn copy_from(bytes: &[u8], offset: u64, buffer: &mut [u8]) -> io::Result<()> {
+pub(super) fn copy_from(bytes: &[u8], offset: u64, buffer: &mut [u8]) -> io::Result<()> {
     let found = usize::try_from(offset).ok().and_then(|start| {
         let end = start.checked_add(buffer.len())?;
         bytes.get(start..end)

@@ -1,7 +1,7 @@
 use std::io;
 use std::sync::atomic::{AtomicU64, Ordering};
 
-use super::PageSource;
+use super::page_source::PageSource;
 
 /// Counts what is read from another source.
 #[derive(Debug)]

@@ -2,7 +2,7 @@ use std::io;
 use std::sync::{Mutex, PoisonError};
 use std::time::{Duration, Instant};
 
-use super::PageSource;
+use super::page_source::PageSource;
 
 /// Another source with the latency and the bandwidth of a slower store.
 ///

@@ -2,7 +2,7 @@ use std::fs::File;
 use std::io;
 use std::path::Path;
 
-use super::PageSource;
+use super::page_source::PageSource;
 
 /// A file that is read by position, through the page cache of the operating system.
 #[derive(Debug)]

@@ -1,7 +1,7 @@
 //! A store on virtual time: a line of a given latency and bandwidth.
 //!
 //! A replay in real time is only worth comparing if it can be repeated. Here the clock is told how much time has passed
-//! (see [`Hierarchy::pass`](crate::Hierarchy::pass)), so that the same replay has the same misses on any machine,
+//! (see [`Hierarchy::pass`](vertex_tree::Hierarchy::pass)), so that the same replay has the same misses on any machine,
 //! and disks, network drives and object stores can all be tried on one.
 //!
 //! The model: up to `depth` reads are under way at a time. Each takes the latency, which passes for all of them at
@@ -37,8 +37,8 @@ impl Simulated {
     }
 }
 
-/// A backend's side of a simulated store: what it wants to read, and where that goes.
-pub trait Reads {
+/// What wants to read, and where that goes.
+pub(crate) trait Reads {
     /// What stands for one read while it is under way.
     type Read;
     /// The read to start next, the most urgent one, and how many bytes it takes; `None` if there is nothing to read.
@@ -49,7 +49,7 @@ pub trait Reads {
 
 /// Reads under way on a simulated store.
 #[derive(Debug)]
-pub struct Line<R> {
+pub(crate) struct Line<R> {
     store: Simulated,
     now: Duration,
     /// When the line has carried all that was started.
@@ -60,21 +60,8 @@ pub struct Line<R> {
 
 impl<R> Line<R> {
     /// A line that nothing is under way on.
-    #[must_use]
     pub fn new(store: Simulated) -> Self {
         Self { store, now: Duration::ZERO, free: Duration::ZERO, under_way: VecDeque::new() }
-    }
-
-    /// What the store is like.
-    #[must_use]
-    pub fn store(&self) -> &Simulated {
-        &self.store
-    }
-
-    /// Reads under way.
-    #[must_use]
-    pub fn under_way(&self) -> usize {
-        self.under_way.len()
     }
 
     /// Lets time pass: starts what can be started, ends what has come.
@@ -152,7 +139,7 @@ mod tests {
         assert_eq!(pages.ended.len(), 5);
         line.pass(MS, &mut pages);
         assert_eq!(pages.ended[5..], [100]);
-        assert_eq!(line.under_way(), 0);
+        assert_eq!(line.under_way.len(), 0);
     }
 
     #[test]
@@ -171,7 +158,7 @@ mod tests {
     fn depth_bounds_what_is_under_way() {
         let (mut line, mut pages) = line(None, 2);
         line.pass(5 * MS, &mut pages);
-        assert_eq!((pages.ended.len(), line.under_way()), (2, 2));
+        assert_eq!((pages.ended.len(), line.under_way.len()), (2, 2));
         assert_eq!(line.settle(&mut pages), 10 * MS);
         assert_eq!(pages.ended, [0, 1, 2, 3, 4, 100]);
     }

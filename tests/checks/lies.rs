@@ -1,0 +1,82 @@
+//! Files that lie with checksums that agree: pages that contradict themselves or each other. A front over them may stay coarse, or end
+//! in an error that says so; it never panics, hangs, shows what can not be, or grows without end.
+
+use foldfront::engine::{Engine, Settings};
+use foldfront::vertex_tree::VertexTree;
+
+use crate::common::sink::StrictMesh;
+use crate::common::{Random, random_step, random_view};
+
+pub fn word(bytes: &[u8], at: usize) -> u32 {
+    u32::from_le_bytes(bytes[at..at + 4].try_into().unwrap())
+}
+
+pub fn put(bytes: &mut [u8], at: usize, value: u32) {
+    bytes[at..at + 4].copy_from_slice(&value.to_le_bytes());
+}
+
+/// Start and length of a section of an intact file, whose table is at `table`.
+pub fn section(bytes: &[u8], table: usize, kind: &[u8; 4]) -> (usize, usize) {
+    let entries = (0..word(bytes, table) as usize).map(|i| table + 8 + 32 * i);
+    let entry = entries.into_iter().find(|&at| bytes[at..at + 4] == *kind).unwrap();
+    (word(bytes, entry + 8) as usize, word(bytes, entry + 16) as usize)
+}
+
+/// Changes some words of some pages, given by start and length, and makes their checksums right again: CRC-32 of all but
+/// the first word, which it is in. Half of the lies are true elsewhere.
+pub fn tell_lies(bytes: &mut [u8], pages: &[(usize, usize)], random: &mut Random) {
+    for _ in 0..1 + random.below(4) {
+        let (start, length) = pages[random.below(pages.len())];
+        let at = start + 4 * (1 + random.below(length / 4 - 1));
+        let other = pages[random.below(pages.len())];
+        let elsewhere = word(bytes, other.0 + 4 * random.below(other.1 / 4));
+        let value = match random.below(12) {
+            0 => 0,
+            1 => u32::MAX,
+            2 => word(bytes, at) ^ 1 << random.below(32),
+            3 => word(bytes, at).wrapping_add(1),
+            4 => word(bytes, at).wrapping_sub(1),
+            5 => random.below(pages.len()) as u32,
+            _ => elsewhere,
+        };
+        put(bytes, at, value);
+        let sum = crc32fast::hash(&bytes[start + 4..start + length]);
+        put(bytes, start, sum);
+    }
+}
+
+/// What came of following a front over a file.
+#[derive(Debug, Default)]
+pub struct Outcome {
+    /// Frames that ended in an error.
+    pub errors: u64,
+    /// Pages that were read in vain, or contradict others.
+    pub faults: u64,
+}
+
+/// Follows a walk. No more than so many triangles can be displayed at a time, or be left behind.
+pub fn follow<T: VertexTree>(tree: T, seed: u64, most: usize) -> Outcome {
+    let mut random = Random(seed);
+    let settings = Settings { rho: 0.02, ..Settings::default() };
+    let mut engine = Engine::new(tree, StrictMesh::default(), settings).unwrap();
+    let mut view = random_view(&mut random).with_k([3.0, 30.0, 300.0][seed as usize % 3]).unwrap();
+    let mut outcome = Outcome::default();
+    for frame in 0..60 {
+        random_step(&mut view, &mut random);
+        // There and back, so that everything unfolds and folds a few times.
+        let view = if frame % 20 < 12 { view.with_k(1e4).unwrap() } else { view };
+        match engine.advance(&[view]) {
+            Ok(report) => outcome.faults += report.pages.faults,
+            Err(error) => {
+                assert!(!error.to_string().is_empty());
+                outcome.errors += 1;
+            }
+        }
+        let displayed = engine.sink().triangles.len();
+        assert!(displayed <= most, "{displayed} triangles are displayed in frame {frame}");
+        if engine.tree_mut().settle().is_err() {
+            outcome.errors += 1;
+        }
+    }
+    outcome
+}
