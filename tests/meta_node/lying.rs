@@ -33,7 +33,7 @@ fn intact() -> (Vec<u8>, Vec<(usize, usize)>) {
 fn settings(seed: u64, file: &MetaNodeFile) -> Settings {
     let in_use = [InUse::Yields, InUse::Stays, InUse::Printed][seed as usize % 3];
     let dependencies = [Dependencies::Off, Dependencies::Force, Dependencies::Block][seed as usize / 3 % 3];
-    let page_memory = if seed % 2 == 0 { u64::MAX } else { 2 * file.least_memory() };
+    let page_memory = if seed.is_multiple_of(2) { u64::MAX } else { 2 * file.least_memory() };
     let io = Io::Simulated(Simulated::with_latency(Duration::from_millis(5)));
     Settings { page_memory, dependencies, in_use, io, ..Settings::default() }
 }

@@ -133,7 +133,7 @@ fn nodes_that_lie_are_faults() {
         found += u32::from(file.verify().is_err());
         let store = Simulated::with_latency(Duration::from_millis(5));
         let cache = CacheMode::ALL[seed as usize % CacheMode::ALL.len()];
-        let memory = Memory::new(if seed % 2 == 0 { u64::MAX } else { 2 * file.least_memory() });
+        let memory = Memory::new(if seed.is_multiple_of(2) { u64::MAX } else { 2 * file.least_memory() });
         let reader = Some(Reader::simulated(store));
         let settings = Settings { cache, memory, reader, ..Settings::default() };
         let Ok(tree) = MtTree::new(Arc::new(file), settings) else { continue };

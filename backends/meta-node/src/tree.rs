@@ -453,15 +453,13 @@ impl VertexTree for MetaNodeTree {
         }
         let page = self.pager.page(holder);
         let of = page.node(slot);
-        if let Some(stars) = &self.mesh {
-            if let Some(rules) = &mut self.rules {
-                halves(node.0 - slot, page, of).into_iter().for_each(|half| rules.leave(half));
-                let parent = match of.parent() {
-                    Ok(slot) => Some(page.node(slot).log_number()),
-                    Err(block) => Some(page.above(block).1).filter(|&above| above != vertex_tree::NONE),
-                };
-                rules.show(stars.vertex(kept), kept, Some((node, collapse)), parent);
-            }
+        if let (Some(rules), Some(stars)) = (&mut self.rules, &self.mesh) {
+            halves(node.0 - slot, page, of).into_iter().for_each(|half| rules.leave(half));
+            let parent = match of.parent() {
+                Ok(slot) => Some(page.node(slot).log_number()),
+                Err(block) => Some(page.above(block).1).filter(|&above| above != vertex_tree::NONE),
+            };
+            rules.show(stars.vertex(kept), kept, Some((node, collapse)), parent);
         }
         self.displayed -= u64::from(end - start);
         self.pager.touch(holder);
