@@ -84,6 +84,11 @@ impl StarMesh {
         self.misfit.take()
     }
 
+    #[cold]
+    fn note_misfit(&mut self, removed: u32) {
+        self.misfit.get_or_insert(removed);
+    }
+
     /// The leaf shown in a slot of the vertices; [`NONE`] in a hole.
     #[must_use]
     pub fn leaf(&self, vertex: VertexId) -> u32 {
@@ -175,8 +180,7 @@ impl StarMesh {
         mesh: &mut M,
     ) {
         let Some(to) = self.show_vertex(removed, position, mesh) else {
-            self.misfit = self.misfit.or(Some(removed));
-            return;
+            return self.note_misfit(removed);
         };
         let triangles = &mut self.triangles;
         let moves =
@@ -203,6 +207,9 @@ impl StarMesh {
     /// star is at vertex `to`.
     #[inline(always)]
     fn merge_vertex<M: MeshSink>(&mut self, to: VertexId, from: VertexId, removed: u32, mesh: &mut M) {
+        if from == NONE || from == to {
+            return self.note_misfit(removed);
+        }
         for at in 0..self.stars.brought(from).len() {
             self.remove_brought(self.stars.brought(from)[at], mesh);
         }

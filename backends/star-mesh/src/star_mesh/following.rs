@@ -125,13 +125,8 @@ impl StarMesh {
         let kept = vertex(0);
         match position {
             Some(position) if kept != NONE => self.split_vertex(kept, leaves[1], position, brought, mesh),
-            None if kept != NONE => match vertex(1) {
-                removed if removed != NONE && removed != kept => {
-                    self.merge_vertex(kept, removed, leaves[1], mesh);
-                }
-                _ => self.misfit = self.misfit.or(Some(leaves[1])),
-            },
-            _ => self.misfit = self.misfit.or(Some(leaves[1])),
+            None if kept != NONE => self.merge_vertex(kept, vertex(1), leaves[1], mesh),
+            _ => self.note_misfit(leaves[1]),
         }
     }
 }
