@@ -2,7 +2,7 @@
 //! foresight, and the time that frames wait where they load as DeCoro & Pajarola and Holst & Schumann print it, along real trajectories over real meshes, on virtual time; then what a slow store does to the time of
 //! selection.
 //!
-//! `cargo bench --bench prefetch [-- PART... MESH...]` prints tables. The parts are `--misses`, `--bytes` (see `bytes`), `--slow` and `--wall-clock`
+//! `cargo bench --bench prefetch [-- PART... MESH... BACKEND...]` prints tables. The parts are `--misses`, `--bytes` (see `bytes`), `--slow` and `--wall-clock`
 //! (see `slow_store`), all of them unless some are named. The meshes are dragon, happy, tile (of the Sierra Nevada) and sierra (four of them) of the shared
 //! data, or what is found under these names, as collapse logs, in the folder that `FOLDFRONT_LOGS` names.
 
@@ -76,10 +76,15 @@ fn main() {
         parts = Parts { misses: true, bytes: true, slow: true, wall_clock: true };
     }
     let wanted: Vec<String> = std::env::args().skip(1).filter(|a| !a.starts_with('-')).collect();
+    let named = |all: &[&str]| wanted.iter().any(|name| all.contains(&name.as_str()));
+    let backends = BACKENDS.map(Backend::name);
     for (mesh, files) in MESHES {
-        if wanted.is_empty() || wanted.iter().any(|name| name == mesh) {
+        if !named(&MESHES.map(|(mesh, _)| mesh)) || named(&[mesh]) {
             match hierarchy(mesh, files) {
-                Some(log) => compare(mesh, &log, parts),
+                Some(log) => {
+                    let is_wanted = |backend: &Backend| !named(&backends) || named(&[backend.name()]);
+                    compare(mesh, &log, parts, BACKENDS.into_iter().filter(is_wanted));
+                }
                 None => println!("{mesh}: not there"),
             }
         }
@@ -109,7 +114,7 @@ fn is_terrain(mesh: &str) -> bool {
     matches!(mesh, "tile" | "sierra")
 }
 
-fn compare(mesh: &str, log: &foldfront::CollapseLog, parts: Parts) {
+fn compare(mesh: &str, log: &foldfront::CollapseLog, parts: Parts, backends: impl Iterator<Item = Backend>) {
     let folder = tempfile::tempdir().expect("room for files");
     let walks: Vec<Path> = if parts.misses || parts.slow || parts.wall_clock {
         let walk = |trajectory| {
@@ -123,7 +128,7 @@ fn compare(mesh: &str, log: &foldfront::CollapseLog, parts: Parts) {
         Vec::new()
     };
     let stretches = if parts.bytes { bytes::stretches(mesh, log) } else { Vec::new() };
-    for backend in BACKENDS {
+    for backend in backends {
         let file = folder.path().join(backend.name());
         store::write(backend, &file, log, &BuildOptions::default()).expect("room for files");
         println!(

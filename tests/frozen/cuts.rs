@@ -5,7 +5,9 @@
 //! misses, reads and bytes). Where something is meant to change, the new table is printed, to be looked at.
 //!
 //! Changed since: `laserscan-wild meta-node schedule`, where seven pages are read two frames earlier. How long reads take is noted
-//! after what was known of it has faded for the frame, in all backends.
+//! after what was known of it has faded for the frame, in all backends. And `mt-partition schedule`, all six: what a read brings
+//! beside what was foreseen stays until what else is under way has come, so that it is not read again: fewer reads and bytes on every
+//! path, and no more misses on any (`benches/record/2026-11-30-trajectories.md`).
 
 use std::fmt::Write;
 use std::path::Path as FilePath;

@@ -9,6 +9,7 @@ use vertex_tree::{NONE, NodeId};
 
 use crate::format::{Header, block_sum};
 use crate::node::Stored;
+use crate::node_memory::Place;
 use crate::numbering::{Owner, owner};
 
 /// A node in memory: a cache line.
@@ -26,6 +27,20 @@ pub(crate) struct Node {
 pub(crate) const ACTIVE: u32 = 1 << 31;
 
 impl Node {
+    /// What no block's node is.
+    pub const BLANK: Self = Self {
+        stored: Stored {
+            position: [0.0; 3],
+            normal: [0.0; 3],
+            radius: 0.0,
+            sine: 0.0,
+            adjacent: [NONE; 4],
+            eps: 0.0,
+        },
+        slots: [NONE; 2],
+        status: 0,
+    };
+
     #[inline(always)]
     pub fn is_active(&self) -> bool {
         self.status & ACTIVE != 0
@@ -58,7 +73,15 @@ pub(crate) struct Block {
     pub used: u64,
     /// When it left play, 0 while it has not.
     pub left: u64,
-    pub nodes: Box<[Node]>,
+    /// Where its nodes are, while it is loaded.
+    pub place: Place,
+}
+
+/// A block as it comes from the file.
+#[derive(Clone, Debug)]
+pub(crate) struct Inflated {
+    pub block: Block,
+    pub nodes: Vec<Node>,
 }
 
 /// Bytes of memory that a block of so many nodes takes.
@@ -68,7 +91,7 @@ pub(crate) fn resident_bytes(nodes: u32) -> u64 {
 
 impl Block {
     /// Inflates a block from its bytes in the file. What is wrong with them is said as an error.
-    pub fn decode(header: &Header, number: u32, bytes: &[u8]) -> Result<Self, &'static str> {
+    pub fn decode(header: &Header, number: u32, bytes: &[u8]) -> Result<Inflated, &'static str> {
         let levels = header.levels;
         let (count, by_length) = header.nodes_of(bytes.len() as u64).ok_or("its length fits no block")?;
         let (body, sum) = bytes.split_at(bytes.len() - 4);
@@ -124,8 +147,7 @@ impl Block {
             }
             nodes.push(Node { stored, slots: [NONE; 2], status: 0 });
         }
-        let nodes = nodes.into_boxed_slice();
-        Ok(Self {
+        let block = Self {
             number,
             flags: present,
             parent,
@@ -136,15 +158,21 @@ impl Block {
             stamp: 0,
             used: 0,
             left: 0,
-            nodes,
-        })
+            place: Place::default(),
+        };
+        Ok(Inflated { block, nodes })
     }
 
-    /// Where the node at an offset is in `nodes`, if it is present.
+    /// How many nodes it has.
+    #[inline(always)]
+    pub fn count(&self) -> u32 {
+        self.flags.count_ones()
+    }
+
+    /// Where the node at an offset is among its nodes, if it is present.
     #[inline(always)]
     pub fn index_of(&self, offset: u32) -> Option<usize> {
-        let bit = 1 << offset;
-        (self.flags & bit != 0).then(|| (self.flags & (bit - 1)).count_ones() as usize)
+        index_of(self.flags, offset)
     }
 
     /// The number of the child block at a place among the possible ones.
@@ -153,6 +181,13 @@ impl Block {
         let bit = 1 << place;
         (self.children & bit != 0).then(|| self.first_child + (self.children & (bit - 1)).count_ones())
     }
+}
+
+/// Where the node at an offset is among those that a block has, if it is present.
+#[inline(always)]
+pub(crate) fn index_of(flags: u32, offset: u32) -> Option<usize> {
+    let bit = 1 << offset;
+    (flags & bit != 0).then(|| (flags & (bit - 1)).count_ones() as usize)
 }
 
 /// Whether a half-edge number belongs to something that could be there.

@@ -1,7 +1,7 @@
 //! The blocks in memory: the directory (section 4 of the paper).
 //!
-//! The directory holds a number for each block, of where it is among the loaded ones. A root of a block that is in play
-//! but removed leaves behind its sphere, error and parent: a [`Stub`].
+//! The directory says of each block where it is among the loaded ones, which nodes it has and where they are, so that the
+//! way to a node does not lead through its block. A root of a block that is in play but removed leaves behind its sphere, error and parent: a [`Stub`].
 
 use std::ops::Range;
 use std::sync::Arc;
@@ -10,8 +10,9 @@ use rustc_hash::FxHashMap;
 use slab::Slab;
 use vertex_tree::{Bounds, NONE, NodeId};
 
-use crate::block::{Block, Node, resident_bytes};
+use crate::block::{Block, Inflated, Node, index_of, resident_bytes};
 use crate::file::XfmFile;
+use crate::node_memory::{NodeMemory, Place};
 
 /// What a removed block's root in play is still asked about.
 #[derive(Clone, Copy, Debug)]
@@ -20,11 +21,22 @@ pub(crate) struct Stub {
     pub parent: u32,
 }
 
+/// What the directory says of a block.
+#[derive(Clone, Copy, Debug, Default)]
+struct Entry {
+    /// Which nodes it has, as stored: the root at least. None while it is not loaded.
+    flags: u32,
+    nodes: Place,
+    /// Where it is among the loaded blocks.
+    slot: u32,
+}
+
 /// The blocks in memory.
 pub(crate) struct Blocks {
     pub file: Arc<XfmFile>,
-    directory: Vec<u32>,
+    directory: Vec<Entry>,
     loaded: Slab<Block>,
+    nodes: NodeMemory,
     /// What they take.
     pub bytes: u64,
     pub stubs: FxHashMap<u32, Stub>,
@@ -33,9 +45,10 @@ pub(crate) struct Blocks {
 impl Blocks {
     pub fn new(file: Arc<XfmFile>) -> Self {
         Self {
-            directory: vec![NONE; file.header().blocks as usize],
+            directory: vec![Entry::default(); file.header().blocks as usize],
             file,
             loaded: Slab::new(),
+            nodes: NodeMemory::default(),
             bytes: 0,
             stubs: FxHashMap::default(),
         }
@@ -43,44 +56,51 @@ impl Blocks {
 
     /// Bytes that are taken whatever is loaded.
     pub fn fixed_bytes(&self) -> u64 {
-        self.file.fixed_bytes() + 4 * self.directory.len() as u64
+        self.file.fixed_bytes() + (size_of::<Entry>() * self.directory.len()) as u64
     }
 
     /// A block, if it is loaded.
     #[inline(always)]
     pub fn block(&self, number: u32) -> Option<&Block> {
-        match *self.directory.get(number as usize)? {
-            NONE => None,
-            slot => Some(&self.loaded[slot as usize]),
-        }
+        let entry = self.directory.get(number as usize)?;
+        (entry.flags != 0).then(|| &self.loaded[entry.slot as usize])
     }
 
     #[inline(always)]
     pub fn block_mut(&mut self, number: u32) -> Option<&mut Block> {
-        match *self.directory.get(number as usize)? {
-            NONE => None,
-            slot => Some(&mut self.loaded[slot as usize]),
-        }
+        let entry = self.directory.get(number as usize)?;
+        (entry.flags != 0).then(|| &mut self.loaded[entry.slot as usize])
     }
 
     pub fn iter(&self) -> impl Iterator<Item = &Block> {
         self.loaded.iter().map(|(_, block)| block)
     }
 
+    /// A node of a loaded block, by its place among those.
+    #[inline(always)]
+    pub fn node_of(&self, block: &Block, index: usize) -> &Node {
+        self.nodes.node(block.place, index)
+    }
+
     /// A node, if its block is loaded and it is there.
     #[inline(always)]
     pub fn node(&self, node: NodeId) -> Option<&Node> {
-        let levels = self.file.levels();
-        let block = self.block(levels.block(node))?;
-        Some(&block.nodes[block.index_of(levels.offset(node))?])
+        let (place, index) = self.place(node)?;
+        Some(self.nodes.node(place, index))
     }
 
     #[inline(always)]
     pub fn node_mut(&mut self, node: NodeId) -> Option<&mut Node> {
+        let (place, index) = self.place(node)?;
+        Some(self.nodes.node_mut(place, index))
+    }
+
+    /// Where a node is: the nodes of its block, and which of these.
+    #[inline(always)]
+    fn place(&self, node: NodeId) -> Option<(Place, usize)> {
         let levels = self.file.levels();
-        let block = self.block_mut(levels.block(node))?;
-        let index = block.index_of(levels.offset(node))?;
-        Some(&mut block.nodes[index])
+        let entry = self.directory.get(levels.block(node) as usize)?;
+        Some((entry.nodes, index_of(entry.flags, levels.offset(node))?))
     }
 
     #[inline(always)]
@@ -141,22 +161,25 @@ impl Blocks {
         parent != NONE && self.is_active(NodeId(parent))
     }
 
-    pub fn insert(&mut self, block: Block) {
+    pub fn insert(&mut self, Inflated { mut block, nodes }: Inflated) {
         self.stubs.remove(&block.number);
-        self.bytes += resident_bytes(block.nodes.len() as u32);
-        let number = block.number as usize;
-        self.directory[number] = self.loaded.insert(block) as u32;
+        self.bytes += resident_bytes(block.count());
+        block.place = self.nodes.insert(&nodes);
+        let (number, flags, nodes) = (block.number, block.flags, block.place);
+        let slot = self.loaded.insert(block) as u32;
+        self.directory[number as usize] = Entry { flags, nodes, slot };
     }
 
     /// Removes a block that is loaded.
     pub fn remove(&mut self, number: u32) -> Block {
-        let slot = std::mem::replace(&mut self.directory[number as usize], NONE);
+        let Entry { slot, .. } = std::mem::take(&mut self.directory[number as usize]);
         let block = self.loaded.remove(slot as usize);
-        self.bytes -= resident_bytes(block.nodes.len() as u32);
+        self.bytes -= resident_bytes(block.count());
         if block.parent != NONE && self.is_active(NodeId(block.parent)) {
-            let stub = Stub { bounds: block.nodes[0].stored.bounds(), parent: block.parent };
+            let stub = Stub { bounds: self.node_of(&block, 0).stored.bounds(), parent: block.parent };
             self.stubs.insert(number, stub);
         }
+        self.nodes.remove(block.place);
         block
     }
 
@@ -164,7 +187,7 @@ impl Blocks {
     ///
     /// # Errors
     /// What is wrong, in words.
-    pub fn check_links(&self, block: &Block) -> Result<(), &'static str> {
+    pub fn check_links(&self, Inflated { block, nodes }: &Inflated) -> Result<(), &'static str> {
         let levels = self.file.levels();
         let number = block.number;
         let root = levels.node(number, 0);
@@ -172,7 +195,7 @@ impl Blocks {
         if listed.is_some() != (block.parent == NONE) {
             return Err("it is a root's and not in the root list, or the reverse");
         }
-        if listed.is_some_and(|i| self.file.roots()[i].1 != block.nodes[0].stored.bounds()) {
+        if listed.is_some_and(|i| self.file.roots()[i].1 != nodes[0].stored.bounds()) {
             return Err("the root list has another sphere");
         }
         if block.parent != NONE

@@ -7,7 +7,7 @@ use container::{FileError, Georeference, Sections, read_at};
 use page_store::source::{FileSource, MappedSource, PageSource};
 use vertex_tree::{Bounds, NodeId};
 
-use crate::block::{Block, resident_bytes};
+use crate::block::{Block, Inflated, resident_bytes};
 use crate::error::XfmError;
 use crate::format::{ENTRY_BYTES, Header, OFFSET_BITS, RECORD_BYTES};
 use crate::half_edges::{BOUNDARY, HalfEdges, Triangle, next};
@@ -285,7 +285,7 @@ impl XfmFile {
     }
 
     /// Reads a block and checks it.
-    pub(crate) fn read_block(&self, block: u32, bytes: &mut Vec<u8>) -> Result<Block, XfmError> {
+    pub(crate) fn read_block(&self, block: u32, bytes: &mut Vec<u8>) -> Result<Inflated, XfmError> {
         let (offset, length) = self.place(block);
         bytes.resize(length as usize, 0);
         read_at(&*self.source, offset, bytes)?;

@@ -92,12 +92,12 @@ pub(crate) fn peek(blocks: &Blocks, node: NodeId, children: &mut Vec<(NodeId, Bo
                 children.truncate(before);
                 return false;
             };
-            children.push((levels.node(child, 0), below.nodes[0].stored.bounds()));
+            children.push((levels.node(child, 0), blocks.node_of(below, 0).stored.bounds()));
         }
     } else {
         for below in [2 * offset + 1, 2 * offset + 2] {
             if let Some(index) = block.index_of(below) {
-                children.push((levels.node(number, below), block.nodes[index].stored.bounds()));
+                children.push((levels.node(number, below), blocks.node_of(block, index).stored.bounds()));
             }
         }
     }

@@ -39,6 +39,7 @@ mod header;
 mod layout;
 mod nesting;
 mod node;
+mod node_memory;
 mod numbering;
 mod options;
 mod paging;

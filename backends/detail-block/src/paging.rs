@@ -24,7 +24,7 @@ use page_store::{Arrival, Failures, NOW as URGENT, Requests, Simulated, Store, T
 use rustc_hash::FxHashMap;
 use vertex_tree::{NodeId, PageStats, TreeError};
 
-use crate::block::{Block, resident_bytes};
+use crate::block::{Inflated, resident_bytes};
 use crate::blocks::Blocks;
 use crate::error::{XfmError, tree_error};
 use crate::file::XfmFile;
@@ -223,16 +223,16 @@ impl Paging {
             Err(error) => return self.failed(run.first, error, is_demanded),
         };
         for (number, block) in run.numbers().zip(blocks) {
-            let check = |block: Block| match self.blocks.check_links(&block) {
+            let check = |block: Inflated| match self.blocks.check_links(&block) {
                 Ok(()) => Ok(block),
                 Err(reason) => Err(self.blocks.file.damaged(number, reason)),
             };
             match block.and_then(check) {
-                Ok(mut block) => {
+                Ok(mut inflated) => {
                     // A read that came ahead of time is used when its first block is.
-                    block.is_unused = !is_demanded && number == run.first;
+                    inflated.block.is_unused = !is_demanded && number == run.first;
                     self.counts.ahead += u64::from(!is_demanded);
-                    self.insert(block);
+                    self.insert(inflated);
                 }
                 Err(error) => {
                     self.stats.faults += 1;
@@ -242,11 +242,11 @@ impl Paging {
         }
     }
 
-    fn insert(&mut self, mut block: Block) {
-        let number = block.number;
+    fn insert(&mut self, mut inflated: Inflated) {
+        let number = inflated.block.number;
         self.failures.forget(number);
-        block.used = self.frame;
-        self.blocks.insert(block);
+        inflated.block.used = self.frame;
+        self.blocks.insert(inflated);
         self.counts.loads += 1;
         self.counts.soon_again += u64::from(self.removal.came(number));
         self.may_go(number);

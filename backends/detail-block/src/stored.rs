@@ -6,7 +6,7 @@ use std::sync::Arc;
 use container::read_at;
 use page_store::Pages;
 
-use crate::block::Block;
+use crate::block::{Block, Inflated};
 use crate::error::XfmError;
 use crate::file::XfmFile;
 
@@ -36,7 +36,7 @@ pub(crate) struct Stored(pub Arc<XfmFile>);
 impl Pages for Stored {
     type Read = Run;
     /// Each block by itself: one that is damaged says nothing of the others.
-    type Content = Vec<Result<Block, XfmError>>;
+    type Content = Vec<Result<Inflated, XfmError>>;
     type Error = XfmError;
 
     fn bytes(&self, run: &Run) -> u64 {

@@ -4,6 +4,7 @@
 
 use vertex_tree::{Bounds, NONE, NodeId, NormalCone};
 
+use crate::block::Inflated;
 use crate::cone;
 use crate::error::XfmError;
 use crate::file::XfmFile;
@@ -30,27 +31,27 @@ impl XfmFile {
     pub fn verify(&self) -> Result<(), XfmError> {
         self.verify_unknown()?;
         let header = self.header();
-        let (levels, nodes) = (header.levels, header.nodes as usize);
+        let (levels, count) = (header.levels, header.nodes as usize);
         let mut kept = Kept {
-            bounds: Vec::with_capacity(nodes),
-            cones: Vec::with_capacity(nodes),
-            above: Vec::with_capacity(nodes),
-            sides: Vec::with_capacity(nodes),
+            bounds: Vec::with_capacity(count),
+            cones: Vec::with_capacity(count),
+            above: Vec::with_capacity(count),
+            sides: Vec::with_capacity(count),
             flags: Vec::with_capacity(header.blocks as usize),
         };
-        let mut half_edges = Vec::with_capacity(nodes);
+        let mut half_edges = Vec::with_capacity(count);
         // What is above each block, as its parent's block says.
         let mut named = vec![NONE; header.blocks as usize];
         let mut bytes = Vec::new();
         let mut triangles = header.initial_faces;
         for number in 0..header.blocks as u32 {
-            let block = self.read_block(number, &mut bytes)?;
+            let Inflated { block, nodes } = self.read_block(number, &mut bytes)?;
             let root = levels.node(number, 0);
             let listed = self.roots().binary_search_by_key(&root, |&(root, _)| root).ok();
             if block.parent != named[number as usize] || listed.is_some() != (block.parent == NONE) {
                 return Err(self.damaged(number, "root list, parent and child blocks do not agree"));
             }
-            if listed.is_some_and(|i| self.roots()[i].1 != block.nodes[0].stored.bounds()) {
+            if listed.is_some_and(|i| self.roots()[i].1 != nodes[0].stored.bounds()) {
                 return Err(self.damaged(number, "the root list has another sphere"));
             }
             for place in 0..levels.fan_out() {
@@ -62,7 +63,7 @@ impl XfmFile {
                 }
             }
             for (offset, index) in (0..levels.full()).filter_map(|o| Some((o, block.index_of(o)?))) {
-                let node = &block.nodes[index].stored;
+                let node = &nodes[index].stored;
                 let [w, x, y, z] = node.adjacent;
                 let sides = Adjacent { w, x, y, z }.sides();
                 triangles += sides.iter().map(|&side| u64::from(side)).sum::<u64>();

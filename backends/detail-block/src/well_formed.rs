@@ -18,11 +18,12 @@ impl XfmTree {
         let mut displayed = self.paging.blocks.file.initial_faces().triangles.len() as u64;
         let (mut needs, mut needed_by, mut bytes) = (0_u64, 0_u64, 0);
         for block in self.paging.blocks.iter() {
-            bytes += crate::block::resident_bytes(block.nodes.len() as u32);
+            bytes += crate::block::resident_bytes(block.count());
             let mut active = 0;
             for offset in 0..levels.full() {
                 let Some(index) = block.index_of(offset) else { continue };
-                let (id, node) = (levels.node(block.number, offset), &block.nodes[index]);
+                let (id, node) =
+                    (levels.node(block.number, offset), self.paging.blocks.node_of(block, index));
                 if !node.is_active() {
                     assert_eq!((node.needed_by(), node.slots), (0, [NONE; 2]), "folded node {id:?}");
                     continue;

@@ -56,7 +56,8 @@ struct Read {
 }
 
 /// Frames in which the cache mode may wait for answers: what has arrived for a change that waits for more would be let go
-/// of otherwise. A front that never comes to rest must not keep everything.
+/// of otherwise, and what has come along with something foreseen before it is foreseen itself. A front that never comes to
+/// rest must not keep everything.
 const PATIENCE: u32 = 16;
 
 /// A read that has failed is tried again after 1, 2, 4 ... frames, up to this many.
@@ -406,8 +407,9 @@ impl Paging {
             self.has_told = self.wanted > 0;
         }
         self.relieve();
-        self.unanswered_frames = if self.groups.is_empty() { 0 } else { self.unanswered_frames + 1 };
-        if self.groups.is_empty() || self.unanswered_frames > PATIENCE {
+        // What is foreseen comes a few nodes of a partition at a time: the others that the read brings are next.
+        self.unanswered_frames = if self.reads.is_empty() { 0 } else { self.unanswered_frames + 1 };
+        if self.reads.is_empty() || self.unanswered_frames > PATIENCE {
             self.unanswered_frames = 0;
             self.clean();
         }
