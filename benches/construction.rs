@@ -9,8 +9,9 @@ use std::path::Path;
 use std::time::Duration;
 
 use criterion::{BatchSize, Criterion, Throughput, criterion_group, criterion_main};
-use foldfront::simplify::{Options, build};
-use foldfront::{Mesh, mesh_io};
+use foldfront::Mesh;
+use foldfront::construction::mesh_io;
+use foldfront::construction::simplify::{Options, build};
 
 /// Squares of rough ground, `side` a side.
 fn terrain(side: u32) -> Mesh {

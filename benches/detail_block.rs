@@ -15,18 +15,25 @@ use std::sync::Arc;
 use std::time::{Duration, Instant};
 
 use detail_block::{Arrangement, BuildOptions, Io, XfmFile, XfmTree};
-use foldfront::active_mesh::ActiveMesh;
-use foldfront::budget::Budget;
+use foldfront::Mesh;
 use foldfront::collapse_log::CollapseLog;
-use foldfront::deviation::Reference;
-use foldfront::engine::{Engine, Settings};
+use foldfront::construction::mesh_io;
+use foldfront::construction::simplify;
+use foldfront::experiment::deviation::Reference;
+use foldfront::experiment::path::{Path, around, recorded};
+use foldfront::experiment::scene::{Scene, SceneKind};
 use foldfront::page_store::source::FileSource;
-use foldfront::path::{Path, around, recorded};
-use foldfront::refine::Strategy;
-use foldfront::scene::{Scene, SceneKind};
+use foldfront::selection::active_mesh::ActiveMesh;
+use foldfront::selection::budget::Budget;
+use foldfront::selection::engine::{Engine, Settings};
+use foldfront::selection::refine::Strategy;
+use foldfront::selection::view::{View, theta_of_pixels};
 use foldfront::vertex_tree::{MeshSink, NullSink};
-use foldfront::view::{View, theta_of_pixels};
-use foldfront::{Mesh, mesh_io, simplify};
+
+/// Vertices and triangles as a mesh.
+fn shown((positions, triangles): (Vec<[f32; 3]>, Vec<[u32; 3]>)) -> Mesh {
+    Mesh { positions, triangles, ..Mesh::default() }
+}
 
 const LINES: u32 = 1080;
 /// The paper's soft quota.
@@ -294,8 +301,11 @@ fn deviation(log: &CollapseLog, file: &Arc<XfmFile>, path: &Path) -> (f64, f64) 
     let mut engine = engine(file, ActiveMesh::new(), path, Strategy::Event, 1.0);
     for frame in (60..path.frames.len()).step_by(path.frames.len() / 4) {
         engine.advance(&[view(path, frame)]).expect("the store is there");
-        let found =
-            reference.deviation(&engine.sink().to_mesh(), &path.camera(frame).expect("a camera"), LINES);
+        let found = reference.deviation(
+            &shown(engine.sink().gathered()),
+            &path.camera(frame).expect("a camera"),
+            LINES,
+        );
         for way in [&found.forward, &found.reverse] {
             (p99, most) = (p99.max(way.inner.p99), most.max(way.inner.max));
         }

@@ -7,11 +7,12 @@
 
 use std::path::PathBuf;
 
-use foldfront::compare::{Options, Subject};
-use foldfront::cut::{Displayed, uniform_cut};
-use foldfront::deviation::{Deviation, Reference};
-use foldfront::path::import::{self, Mode, import};
-use foldfront::{mesh_io, simplify};
+use foldfront::construction::mesh_io;
+use foldfront::construction::simplify;
+use foldfront::experiment::compare::{Options, Subject};
+use foldfront::experiment::deviation::{Deviation, Reference};
+use foldfront::experiment::path::import::{self, Mode, import};
+use foldfront::testing::cut::{Displayed, uniform_cut};
 
 const LINES: u32 = 1080;
 const FRAMES: usize = 4;

@@ -16,13 +16,15 @@ use std::fs::File;
 use std::io::{self, BufWriter, Write};
 use std::path::{Path as FilePath, PathBuf};
 
-use foldfront::compare::{Options, Subject};
+use foldfront::construction::mesh_io;
+use foldfront::construction::simplify;
 use foldfront::container::Georeference;
-use foldfront::deviation::Reference;
-use foldfront::path::{Path, Pose, around};
-use foldfront::refine::Strategy;
-use foldfront::store::{self, Backend, BuildOptions, Store};
-use foldfront::{CollapseLog, Mesh, mesh_io, simplify};
+use foldfront::experiment::compare::{Options, Subject};
+use foldfront::experiment::deviation::Reference;
+use foldfront::experiment::path::{Path, Pose, around};
+use foldfront::experiment::store::{self, Backend, BuildOptions, Store};
+use foldfront::selection::refine::Strategy;
+use foldfront::{CollapseLog, Mesh};
 use glam::DVec3;
 
 const LINES: u32 = 1080;

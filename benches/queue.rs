@@ -2,8 +2,8 @@
 
 use criterion::{BatchSize, Criterion, Throughput, criterion_group, criterion_main};
 use foldfront::Bounds;
-use foldfront::in_play::{Kind, Slot};
-use foldfront::queue::{DUE, Event, EventQueue};
+use foldfront::selection::in_play::{Kind, Slot};
+use foldfront::selection::queue::{DUE, Event, EventQueue};
 
 const EVENTS: u32 = 100_000;
 const BOUNDS: Bounds = Bounds { center: [0.0; 3], radius: 1.0, eps: 0.0 };

@@ -21,15 +21,18 @@ use std::path::{Path as FilePath, PathBuf};
 use std::sync::Arc;
 use std::time::Duration;
 
-use foldfront::compare::{Options, Pace, Run, Subject};
-use foldfront::criterion::Criterion;
-use foldfront::path::import::{self, Mode};
-use foldfront::path::{self, Path};
-use foldfront::refine::Strategy;
-use foldfront::report::{Report, Section};
-use foldfront::scene::{Scene, SceneKind};
-use foldfront::store::{Backend, Store};
-use foldfront::{CollapseLog, mesh_io, output, simplify};
+use foldfront::CollapseLog;
+use foldfront::construction::mesh_io;
+use foldfront::construction::simplify;
+use foldfront::container::output;
+use foldfront::experiment::compare::{Options, Pace, Run, Subject};
+use foldfront::experiment::path::import::{self, Mode};
+use foldfront::experiment::path::{self, Path};
+use foldfront::experiment::report::{Report, Section};
+use foldfront::experiment::scene::{Scene, SceneKind};
+use foldfront::experiment::store::{Backend, Store};
+use foldfront::selection::criterion::Criterion;
+use foldfront::selection::refine::Strategy;
 
 const ROUNDS: usize = 3;
 

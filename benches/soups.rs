@@ -1,21 +1,19 @@
 //! Soups by the hundred thousand: through construction, with and without merged components, and every backend.
 //!
-//! `cargo bench --bench soups -- 100000` checks the soups with seeds from 0 on as `tests/soups` does, prints how many had no end (by
+//! `cargo bench --bench soups -- 100000` checks the soups with seeds from 0 on as `tests/construction/soups` does, prints how many had no end (by
 //! the bound in rounds), were wrong, or panicked, with the seeds, and exits with 1 if any did. A second number is the first
 //! seed. A soup that is still at work after two minutes is given up, and the rest with it.
 
-#[path = "../tests/soups/check.rs"]
+#[path = "../tests/construction/soups/check.rs"]
 #[allow(dead_code)]
 mod check;
-#[path = "../tests/soups/follow.rs"]
+#[path = "../tests/construction/soups/follow.rs"]
 mod follow;
-#[path = "../tests/soups/one.rs"]
+#[path = "../tests/construction/soups/one.rs"]
 mod one;
-#[path = "../tests/simplify/replay.rs"]
+#[path = "../tests/construction/simplify/replay.rs"]
 #[allow(dead_code)]
 mod replay;
-#[path = "../tests/common/sink.rs"]
-mod sink;
 #[path = "../tests/common/soup.rs"]
 #[allow(dead_code)]
 mod soup;

@@ -14,15 +14,17 @@ use std::path::PathBuf;
 use std::sync::Arc;
 use std::time::Duration;
 
-use foldfront::active_mesh::ActiveMesh;
 use foldfront::collapse_log::{read_log, write_log};
-use foldfront::engine::{Engine, FrameReport, Settings};
-use foldfront::path::{self, Path, Pose};
-use foldfront::refine::Strategy;
-use foldfront::scene::{Scene, SceneKind};
+use foldfront::construction::mesh_io;
+use foldfront::construction::simplify;
+use foldfront::experiment::path::{self, Path, Pose};
+use foldfront::experiment::scene::{Scene, SceneKind};
+use foldfront::selection::active_mesh::ActiveMesh;
+use foldfront::selection::engine::{Engine, FrameReport, Settings};
+use foldfront::selection::refine::Strategy;
+use foldfront::selection::view::{View, theta_of_pixels};
 use foldfront::vertex_tree::{MeshSink, NullSink};
-use foldfront::view::{View, theta_of_pixels};
-use foldfront::{CollapseLog, Mesh, mesh_io, simplify};
+use foldfront::{CollapseLog, Mesh};
 use glam::{DMat3, DQuat, DVec3};
 use in_memory::{InMemoryHierarchy, InMemoryTree};
 

@@ -8,13 +8,13 @@
 use std::collections::BTreeSet;
 use std::sync::Arc;
 
-use foldfront::active_mesh::ActiveMesh;
-use foldfront::engine::{Engine, Settings};
+use foldfront::construction::simplify;
+use foldfront::experiment::scene::Scene;
 use foldfront::glam::DVec3;
 use foldfront::in_memory::{InMemoryHierarchy, InMemoryTree};
-use foldfront::scene::Scene;
-use foldfront::simplify;
-use foldfront::view::{Camera, View, theta_of_pixels};
+use foldfront::selection::active_mesh::ActiveMesh;
+use foldfront::selection::engine::{Engine, Settings};
+use foldfront::selection::view::{Camera, View, theta_of_pixels};
 
 /// A buffer of entries of 12 bytes, as a graphics processor has it: three coordinates, or three indices.
 #[derive(Default)]

@@ -4,17 +4,17 @@
 
 use std::sync::Arc;
 
-use foldfront::active_mesh::ActiveMesh;
-use foldfront::engine::{Engine, Settings};
+use foldfront::construction::simplify;
+use foldfront::experiment::scene::Scene;
 use foldfront::glam::DVec3;
 use foldfront::in_memory::{InMemoryHierarchy, InMemoryTree};
-use foldfront::scene::Scene;
-use foldfront::simplify;
-use foldfront::view::{Camera, View, theta_of_pixels};
+use foldfront::selection::active_mesh::ActiveMesh;
+use foldfront::selection::engine::{Engine, Settings};
+use foldfront::selection::view::{Camera, View, theta_of_pixels};
 
 /// Flies over a city of 160,000 triangles and says what is drawn.
 pub fn main() -> Result<(), Box<dyn std::error::Error>> {
-    // `foldfront::mesh_io::read` reads files.
+    // `foldfront::construction::mesh_io::read` reads files.
     let mesh = Scene::parse("scene:city")?.mesh(&mut |_, _| ());
     let (log, _) = simplify::build(mesh, &simplify::Options::default(), &mut |_, _| ())?;
     let tree = InMemoryTree::new(Arc::new(InMemoryHierarchy::new(&log)?));

@@ -15,10 +15,10 @@
 
 #![expect(clippy::disallowed_methods, reason = "a shape to show")]
 
-use foldfront::active_mesh::ActiveMesh;
-use foldfront::engine::{Engine, Settings};
 use foldfront::glam::DVec3;
-use foldfront::view::{Camera, View, theta_of_pixels};
+use foldfront::selection::active_mesh::ActiveMesh;
+use foldfront::selection::engine::{Engine, Settings};
+use foldfront::selection::view::{Camera, View, theta_of_pixels};
 
 /// The backend.
 mod disc {

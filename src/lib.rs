@@ -9,12 +9,12 @@
 //! ```
 //! use std::sync::Arc;
 //!
-//! use foldfront::active_mesh::ActiveMesh;
-//! use foldfront::engine::{Engine, Settings};
+//! use foldfront::selection::active_mesh::ActiveMesh;
+//! use foldfront::selection::engine::{Engine, Settings};
 //! use foldfront::glam::DVec3;
 //! use foldfront::in_memory::{InMemoryHierarchy, InMemoryTree};
-//! use foldfront::simplify;
-//! use foldfront::view::{Camera, View, theta_of_pixels};
+//! use foldfront::construction::simplify;
+//! use foldfront::selection::view::{Camera, View, theta_of_pixels};
 //! use foldfront::Mesh;
 //!
 //! # fn main() -> Result<(), Box<dyn std::error::Error>> {
@@ -55,66 +55,64 @@
 //! # }
 //! ```
 //!
-//! Data flows one way: input ([`mesh_io`], [`scene`]), hierarchy ([`simplify`], [`CollapseLog`]), a backend behind
-//! the [`VertexTree`] trait, the [`engine`] with its [`front`], and the displayed mesh ([`active_mesh`]). The engine itself knows no
-//! meshes: it works over any [`Hierarchy`] that can [`Refine`] into a sink.
+//! Data flows one way: input and hierarchy (`construction`, [`collapse_log`]), a backend behind the [`VertexTree`]
+//! trait, the engine with its front, and the displayed mesh ([`selection`]). The engine itself knows no meshes: it works over any
+//! [`Hierarchy`] that can [`Refine`] into a sink.
+//!
+//! # Features
+//!
+//! | feature | what it adds |
+//! |---|---|
+//! | none | [`selection`], [`collapse_log`], [`vertex_tree`]: no file, no thread, no clock |
+//! | `clock` | frames are timed by the system's clock, where the caller gives no other |
+//! | `in-memory` | the reference backend |
+//! | `meta-node`, `detail-block`, `mt-partition` | the backends that page, with `page_store`, `container` and `clock` |
+//! | `construct` | `construction`: meshes and terrain from files, and their simplification |
+//! | `experiment` | `experiment`: scenes, paths, comparisons, reports, pictures, over every backend; `testing` |
+//! | `cli` (default) | the command line program |
 
-pub mod active_mesh;
-pub mod brute_force;
-pub mod budget;
-pub mod bvh;
-mod carried;
+#![cfg_attr(docsrs, feature(doc_cfg))]
+
+/// How do I: pages with code that compiles.
+#[cfg(feature = "experiment")]
+pub mod guide {
+    #[doc = include_str!("../docs/guide/embed.md")]
+    pub mod embed {}
+    #[doc = include_str!("../docs/guide/glossary.md")]
+    pub mod glossary {}
+    #[doc = include_str!("../docs/guide/own_backend.md")]
+    pub mod own_backend {}
+    #[doc = include_str!("../docs/guide/page_from_disk.md")]
+    pub mod page_from_disk {}
+    #[doc = include_str!("../docs/guide/several_objects.md")]
+    pub mod several_objects {}
+}
+
 #[cfg(feature = "cli")]
 pub mod cli;
-#[cfg(feature = "cli")]
-pub mod compare;
-pub mod criterion;
-pub mod cut;
-pub mod deviation;
-mod edge_lengths;
-pub mod engine;
-mod filter;
-mod foresight;
-pub mod front;
-mod frustum;
-pub mod in_play;
-pub mod mesh_io;
-pub mod motion;
-pub mod normal_cone;
-pub mod objects;
-pub mod oracle;
-mod packed;
-mod parallel;
-pub mod path;
-#[cfg(feature = "cli")]
-pub mod plot;
-pub mod progress;
-pub mod queue;
-pub mod refine;
-pub mod render;
-#[cfg(feature = "cli")]
-pub mod report;
-pub mod scene;
-pub mod settled;
-pub mod simplify;
-mod slot_table;
-#[cfg(all(feature = "in-memory", feature = "meta-node", feature = "detail-block", feature = "mt-partition"))]
-pub mod store;
-pub mod view;
-mod waiting;
+#[cfg(feature = "experiment")]
+pub mod experiment;
 
 pub use collapse_log;
 pub use collapse_log::{Collapse, CollapseLog, Mesh};
+#[cfg(feature = "construct")]
+pub use construction;
+#[cfg(feature = "paging")]
 pub use container;
-pub use container::output;
 #[cfg(feature = "detail-block")]
 pub use detail_block;
 pub use glam;
 #[cfg(feature = "in-memory")]
 pub use in_memory;
+#[cfg(feature = "meta-node")]
+pub use meta_node;
 #[cfg(feature = "mt-partition")]
 pub use mt_partition;
+#[cfg(feature = "paging")]
 pub use page_store;
+pub use selection;
 pub use star_mesh;
+#[cfg(feature = "experiment")]
+pub use testing;
 pub use vertex_tree;
 pub use vertex_tree::{Bounds, Hierarchy, NodeId, Refine, VertexTree};

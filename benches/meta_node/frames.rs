@@ -14,13 +14,13 @@ use std::path::{Path as FilePath, PathBuf};
 use std::process::{Command, Stdio};
 use std::time::{Duration, Instant};
 
-use foldfront::active_mesh::ActiveMesh;
-use foldfront::engine::Engine;
-use foldfront::path::Path;
-use foldfront::path::import::Mode;
-use foldfront::refine::Strategy;
+use foldfront::experiment::path::Path;
+use foldfront::experiment::path::import::Mode;
+use foldfront::selection::active_mesh::ActiveMesh;
+use foldfront::selection::engine::Engine;
+use foldfront::selection::refine::Strategy;
+use foldfront::selection::view::View;
 use foldfront::vertex_tree::{Prefetch, VertexTree};
-use foldfront::view::View;
 use meta_node::{BuildOptions, MetaNodeTree, Settings};
 
 use crate::misses::{CAR, DRONE};

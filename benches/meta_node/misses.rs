@@ -6,12 +6,12 @@
 
 use std::time::{Duration, Instant};
 
-use foldfront::engine::Engine;
+use foldfront::experiment::path::import::Mode;
 use foldfront::page_store::Simulated;
-use foldfront::path::import::Mode;
-use foldfront::refine::Strategy;
+use foldfront::selection::engine::Engine;
+use foldfront::selection::refine::Strategy;
+use foldfront::selection::view::View;
 use foldfront::vertex_tree::{Hierarchy, NullSink, Prefetch};
-use foldfront::view::View;
 use meta_node::{BuildOptions, InUse, Io, MetaNodeTree, Settings};
 
 use crate::selection::settings;

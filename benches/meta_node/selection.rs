@@ -2,12 +2,12 @@
 
 use std::sync::Arc;
 
-use foldfront::active_mesh::ActiveMesh;
-use foldfront::engine::{Engine, Settings};
-use foldfront::path::{self, Path};
-use foldfront::refine::Strategy;
+use foldfront::experiment::path::{self, Path};
+use foldfront::selection::active_mesh::ActiveMesh;
+use foldfront::selection::engine::{Engine, Settings};
+use foldfront::selection::refine::Strategy;
+use foldfront::selection::view::View;
 use foldfront::vertex_tree::{Hierarchy, MeshSink, NullSink, VertexTree};
-use foldfront::view::View;
 use in_memory::{InMemoryHierarchy, InMemoryTree};
 use meta_node::{BuildOptions, MetaNodeTree};
 

@@ -3,12 +3,14 @@
 use std::path::PathBuf;
 use std::sync::Arc;
 
+use foldfront::CollapseLog;
 use foldfront::collapse_log::{read_log, write_log};
+use foldfront::construction::mesh_io;
+use foldfront::construction::simplify;
+use foldfront::experiment::path::Path;
+use foldfront::experiment::path::import::{Mode, Options, import};
 use foldfront::page_store::source::FileSource;
-use foldfront::path::Path;
-use foldfront::path::import::{Mode, Options, import};
-use foldfront::view::{View, theta_of_pixels};
-use foldfront::{CollapseLog, mesh_io, simplify};
+use foldfront::selection::view::{View, theta_of_pixels};
 use meta_node::{BuildOptions, MetaNodeFile};
 
 /// A file or folder among the shared data; `None` where there is no such data.

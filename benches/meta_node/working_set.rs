@@ -8,10 +8,10 @@
 
 use std::collections::BTreeSet;
 
-use foldfront::engine::Engine;
-use foldfront::refine::Strategy;
+use foldfront::selection::engine::Engine;
+use foldfront::selection::refine::Strategy;
+use foldfront::selection::view::View;
 use foldfront::vertex_tree::{Hierarchy, NodeId, NullSink};
-use foldfront::view::View;
 use meta_node::{BuildOptions, MetaNodeFile, MetaNodeTree};
 
 use crate::misses::PATHS;
@@ -74,7 +74,7 @@ pub fn table() {
 fn trace(
     file: &std::sync::Arc<MetaNodeFile>,
     views: &[View],
-    settings: foldfront::engine::Settings,
+    settings: foldfront::selection::engine::Settings,
 ) -> Trace {
     let mut tree = MetaNodeTree::new(file.clone(), meta_node::Settings::default()).expect("memory is there");
     tree.load_all();

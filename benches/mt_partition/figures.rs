@@ -1,11 +1,11 @@
 //! Figures 4 and 5: read operations and memory.
 
 use foldfront::CollapseLog;
-use foldfront::engine::Engine;
-use foldfront::plot::{Plot, Series, curves, stack};
-use foldfront::refine::Strategy;
+use foldfront::experiment::plot::{Plot, Series, curves, stack};
+use foldfront::selection::engine::Engine;
+use foldfront::selection::refine::Strategy;
+use foldfront::selection::view::View;
 use foldfront::vertex_tree::NullSink;
-use foldfront::view::View;
 use mt_partition::{BuildOptions, CacheMode, Memory, MtTree, QueueOrder};
 
 use crate::{build, folder, near, replay, settings, tree, turning, views};

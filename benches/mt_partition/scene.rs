@@ -15,13 +15,13 @@ use std::time::Duration;
 
 use foldfront::CollapseLog;
 use foldfront::Mesh;
-use foldfront::engine::{FrameReport, Settings};
-use foldfront::objects::{ScenePaging, StoredScene};
+use foldfront::construction::simplify;
+use foldfront::experiment::store::Store;
+use foldfront::experiment::stored_scene::{ScenePaging, StoredScene};
 use foldfront::page_store::Simulated;
-use foldfront::simplify;
-use foldfront::store::Store;
+use foldfront::selection::engine::{FrameReport, Settings};
+use foldfront::selection::view::{Camera, View, theta_of_pixels};
 use foldfront::vertex_tree::Prefetch;
-use foldfront::view::{Camera, View, theta_of_pixels};
 use glam::{DQuat, DVec3};
 use mt_partition::{BuildOptions, CacheMode, Memory, Reader};
 

@@ -4,13 +4,13 @@ use std::path::PathBuf;
 use std::sync::Arc;
 
 use foldfront::CollapseLog;
-use foldfront::engine::{Engine, FrameReport};
+use foldfront::experiment::path::import::{Mode, Options, import};
+use foldfront::experiment::path::{self, Path};
 use foldfront::page_store::source::FileSource;
-use foldfront::path::import::{Mode, Options, import};
-use foldfront::path::{self, Path};
-use foldfront::refine::Strategy;
+use foldfront::selection::engine::{Engine, FrameReport};
+use foldfront::selection::refine::Strategy;
+use foldfront::selection::view::View;
 use foldfront::vertex_tree::{Hierarchy, NullSink, VertexTree};
-use foldfront::view::View;
 use in_memory::{InMemoryHierarchy, InMemoryTree};
 use meta_node::{MetaNodeFile, MetaNodeTree};
 use mt_partition::{BuildOptions, CacheMode};

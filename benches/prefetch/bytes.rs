@@ -4,9 +4,9 @@
 use std::path::Path as FilePath;
 
 use foldfront::CollapseLog;
-use foldfront::compare::{Loading, Pace, Run, Subject};
+use foldfront::experiment::compare::{Loading, Pace, Run, Subject};
+use foldfront::experiment::path::Path;
 use foldfront::page_store::Simulated;
-use foldfront::path::Path;
 
 use crate::{FRAME, FRAMES, LATENCY, TRAJECTORIES, imported, memory, open, options};
 
@@ -42,7 +42,7 @@ pub fn table(file: &FilePath, mesh: &str, stretches: &[Path]) -> f64 {
         let runs =
             subject.replay(walk, 0..walk.frames.len(), &options, &mut |_, _| ()).expect("a valid file");
         // The first frame waits for its pages, whatever fetches them.
-        let sum = |run: &Run, f: fn(&foldfront::engine::FrameReport) -> u64| -> u64 {
+        let sum = |run: &Run, f: fn(&foldfront::selection::engine::FrameReport) -> u64| -> u64 {
             run.rows.iter().skip(1).map(|row| f(&row.report)).sum()
         };
         let [misses, without] = [0, 1].map(|i| sum(&runs[i], |report| report.misses));

@@ -13,15 +13,15 @@ use std::path::{Path as FilePath, PathBuf};
 use std::time::Duration;
 
 use foldfront::collapse_log::read_log;
-use foldfront::compare::csv::Summary;
-use foldfront::compare::{Loading, Options, Pace, Paging, Run, Subject};
-use foldfront::mesh_io;
+use foldfront::construction::mesh_io;
+use foldfront::construction::simplify;
+use foldfront::experiment::compare::csv::Summary;
+use foldfront::experiment::compare::{Loading, Options, Pace, Paging, Run, Subject};
+use foldfront::experiment::path::import::{self, Mode};
+use foldfront::experiment::path::{Path, Pose};
+use foldfront::experiment::store::{self, Backend, BuildOptions, Store};
 use foldfront::page_store::Simulated;
-use foldfront::path::import::{self, Mode};
-use foldfront::path::{Path, Pose};
-use foldfront::refine::Strategy;
-use foldfront::simplify;
-use foldfront::store::{self, Backend, BuildOptions, Store};
+use foldfront::selection::refine::Strategy;
 
 const DATA: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/../shared/data");
 
@@ -227,7 +227,7 @@ fn row(run: &Run, page_memory: u64) {
     let s = Summary::new(run);
     // The first frame waits for its pages, whatever fetches them.
     let later = || run.rows.iter().skip(1).map(|row| &row.report);
-    let sum = |f: &dyn Fn(&foldfront::engine::FrameReport) -> u64| later().map(f).sum::<u64>();
+    let sum = |f: &dyn Fn(&foldfront::selection::engine::FrameReport) -> u64| later().map(f).sum::<u64>();
     let (misses, changes) = (sum(&|r| r.misses), sum(&|r| r.unfolds + r.folds));
     let percent = |share: Option<f64>| share.map_or_else(|| "-".to_owned(), |share| format!("{share:.1}"));
     let rest = &run.rows[run.rows.len() - REST..];

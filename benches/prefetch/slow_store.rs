@@ -9,11 +9,11 @@ use std::sync::Arc;
 use std::sync::atomic::{AtomicU64, Ordering};
 use std::time::Duration;
 
-use foldfront::compare::{Loading, Pace, Row, Subject};
+use foldfront::experiment::compare::{Loading, Pace, Row, Subject};
+use foldfront::experiment::path::Path;
+use foldfront::experiment::store::Store;
 use foldfront::page_store::Simulated;
 use foldfront::page_store::source::{FileSource, PageSource};
-use foldfront::path::Path;
-use foldfront::store::Store;
 
 use crate::{FRAME, open, options};
 

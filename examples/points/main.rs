@@ -7,12 +7,12 @@ mod quadtree;
 use std::collections::BTreeMap;
 use std::ops::Range;
 
-use foldfront::brute_force::BruteForce;
-use foldfront::engine::{Engine, Settings};
-use foldfront::path::recorded;
-use foldfront::scene::{Scene, SceneKind};
+use foldfront::experiment::path::recorded;
+use foldfront::experiment::scene::{Scene, SceneKind};
+use foldfront::selection::engine::{Engine, Settings};
+use foldfront::selection::view::theta_of_pixels;
+use foldfront::testing::brute_force::BruteForce;
 use foldfront::vertex_tree::{NullSink, Refine};
-use foldfront::view::theta_of_pixels;
 use quadtree::{PointSink, PointTree};
 
 /// What a renderer would draw: a buffer for each node's points.

@@ -12,13 +12,13 @@ use page_store::Simulated;
 
 use super::say::Misunderstood;
 use super::values::{backend, cache, duration, frames, positive, prefetch, size, strategy, work_cap};
-use crate::budget::WorkCap;
-use crate::compare::{Loading, Pace};
-use crate::criterion::Criterion;
-use crate::path::import;
-use crate::refine::Strategy;
-use crate::store::{Backend, BuildOptions};
-use crate::view::{Camera, View, theta_of_pixels};
+use crate::experiment::compare::{Loading, Pace};
+use crate::experiment::path::import;
+use crate::experiment::store::{Backend, BuildOptions};
+use selection::budget::WorkCap;
+use selection::criterion::Criterion;
+use selection::refine::Strategy;
+use selection::view::{Camera, View, theta_of_pixels};
 
 /// Event-driven view-dependent level of detail: build hierarchies, replay walkthroughs, compare strategies.
 #[derive(Debug, Parser)]

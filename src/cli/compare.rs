@@ -11,16 +11,17 @@ use super::destination::check_folder;
 use super::input::{Input, Replayable};
 use super::progress::stage;
 use super::say::{Misunderstood, print};
-use crate::budget::Budget;
-use crate::compare::{Options, Paging, Run, Subject, csv, replay_scene};
-use crate::objects::StoredScene;
-use crate::path::{self, Path};
-use crate::refine::Strategy;
-use crate::render::{self, Image, Style};
-use crate::report::{Picture, Report, Section};
-use crate::scene::{Scene, SceneKind};
-use crate::store::{Backend, BuildOptions};
-use crate::{output, simplify};
+use crate::experiment::compare::{Options, Paging, Run, Subject, csv, replay_scene};
+use crate::experiment::path::{self, Path};
+use crate::experiment::render::{self, Image, Style};
+use crate::experiment::report::{Picture, Report, Section};
+use crate::experiment::scene::{Scene, SceneKind};
+use crate::experiment::store::{Backend, BuildOptions};
+use crate::experiment::stored_scene::StoredScene;
+use construction::simplify;
+use container::output;
+use selection::budget::Budget;
+use selection::refine::Strategy;
 
 pub(super) fn compare(command: &Compare) -> Result<()> {
     let inputs = if command.input.is_empty() {
@@ -167,7 +168,8 @@ fn objects(
     if walks.is_empty() {
         bail!("{}: a scene of several objects needs a --path", file.display());
     }
-    let options_of_meshes = simplify::Options { merge_components: command.merge_components };
+    let mut options_of_meshes = simplify::Options::default();
+    options_of_meshes.merge_components = command.merge_components;
     let scene = stage(&format!("{name}: opening"), |_| StoredScene::open_with(file, &options_of_meshes))?;
     for object in scene.objects() {
         let own = scene.files()[object.file].backend();

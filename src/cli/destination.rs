@@ -5,7 +5,7 @@ use std::path::{Path, PathBuf};
 use anyhow::{Context, Result, bail, ensure};
 use same_file::Handle;
 
-use crate::store::Backend;
+use crate::experiment::store::Backend;
 
 /// What is written.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]

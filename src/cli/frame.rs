@@ -10,12 +10,12 @@ use super::destination::{Content, check_file};
 use super::input::{Input, Replayable};
 use super::progress::stage;
 use super::say::print;
-use crate::compare::Options;
-use crate::deviation::Reference;
-use crate::path::Path;
-use crate::render::{self, Style};
-use crate::store::BuildOptions;
-use crate::view::Camera;
+use crate::experiment::compare::Options;
+use crate::experiment::deviation::Reference;
+use crate::experiment::path::Path;
+use crate::experiment::render::{self, Style};
+use crate::experiment::store::BuildOptions;
+use selection::view::Camera;
 
 fn options(refinement: &Refinement) -> Options {
     Options {
@@ -60,7 +60,7 @@ fn frame_mesh(frame: &super::arguments::FrameOf) -> Result<(Mesh, Camera)> {
 pub(super) fn export(command: &Export) -> Result<()> {
     check_output(&command.output, Content::Mesh, &command.frame)?;
     let (mesh, _) = frame_mesh(&command.frame)?;
-    crate::mesh_io::write_ply(&command.output, &mesh, None)?;
+    construction::mesh_io::write_ply(&command.output, &mesh, None)?;
     print(&format!("{}: {} triangles\n", command.output.display(), mesh.triangles.len()))
 }
 

@@ -14,10 +14,10 @@ use super::destination::{Content, check_file};
 use super::input::Input;
 use super::progress::stage;
 use super::say::{print, warn};
-use crate::mesh_io::{self, ReadOptions, Receiver};
-use crate::progress::Progress;
-use crate::simplify;
-use crate::store::{self, Backend, BuildOptions, Store, WriteLimits};
+use crate::experiment::store::{self, Backend, BuildOptions, Store, WriteLimits};
+use construction::mesh_io::{self, ReadOptions, Receiver};
+use construction::progress::Progress;
+use construction::simplify;
 
 pub(super) fn build(command: &Build) -> Result<()> {
     let input = Input::one(&command.input)?;
@@ -76,7 +76,8 @@ fn build_within(name: &str, files: &[PathBuf], memory: u64, command: &Build) -> 
     let limits = write_limits(memory, command)?;
     let expected_triangles = mesh_io::expected_triangles(files);
     let folder = &limits.temporary;
-    let options = simplify::Options { merge_components: command.merge_components };
+    let mut options = simplify::Options::default();
+    options.merge_components = command.merge_components;
     let cores = || std::thread::available_parallelism().map_or(1, usize::from).min(simplify::MOST_THREADS);
     let threads = command.threads.map_or_else(cores, usize::from);
     let own = simplify::Limits {
@@ -261,7 +262,7 @@ fn world_box(mesh: &Mesh) -> [[f64; 3]; 2] {
 }
 
 fn base_triangles(log: &CollapseLog) -> usize {
-    crate::cut::Displayed::new(log, &vec![false; log.collapses.len()]).triangles.len()
+    testing::cut::Displayed::new(log, &vec![false; log.collapses.len()]).triangles.len()
 }
 
 /// Everything that reading checks, and that bounds are nested: what the criterion relies on.
@@ -277,7 +278,7 @@ pub(super) fn verify(command: &Verify) -> Result<()> {
         if let Some(above) = log.collapses.get(parent as usize) {
             let (inner, outer) = (&collapse.bounds, &above.bounds);
             anyhow::ensure!(
-                crate::criterion::is_nested(inner, outer),
+                selection::criterion::is_nested(inner, outer),
                 "{}: node {n} is not within its parent {parent}: {inner:?}, {outer:?}",
                 command.file.display()
             );

@@ -9,11 +9,12 @@ use anyhow::{Context, Result, bail};
 use collapse_log::{CollapseLog, Mesh};
 
 use super::progress::stage;
-use crate::compare::Subject;
-use crate::mesh_io;
-use crate::scene::Scene;
-use crate::simplify;
-use crate::store::{self, Backend, BuildOptions, Store};
+use crate::experiment::compare::Subject;
+use crate::experiment::scene::Scene;
+use crate::experiment::store::{self, Backend, BuildOptions, Store};
+use crate::experiment::stored_scene;
+use construction::mesh_io;
+use construction::simplify;
 
 /// One thing to work on.
 #[derive(Clone, Debug, PartialEq)]
@@ -83,7 +84,7 @@ impl Input {
             Self::Log(path) | Self::Stored(path) => vec![path.clone()],
             Self::Objects(path) => {
                 // A scene file that can not be read is complained about when it is opened.
-                let objects = crate::objects::read_scene(path).unwrap_or_default();
+                let objects = stored_scene::read_scene(path).unwrap_or_default();
                 objects.into_iter().map(|(file, _)| file).chain([path.clone()]).collect()
             }
             Self::Meshes(paths) => paths.clone(),
@@ -96,7 +97,7 @@ impl Input {
             Self::Stored(path) => Ok(backend_of(path)?.into_iter().collect()),
             // A scene file that can not be read is complained about when it is opened, and so is what it names.
             Self::Objects(path) => {
-                let objects = crate::objects::read_scene(path).unwrap_or_default();
+                let objects = stored_scene::read_scene(path).unwrap_or_default();
                 let backends = objects.iter().map(|(file, _)| match backend_of(file) {
                     Ok(backend) => backend.or(Some(Backend::InMemory)),
                     Err(_) => None,
@@ -146,10 +147,9 @@ impl Input {
             _ => {}
         }
         let mesh = self.mesh()?;
-        let options = simplify::Options {
-            merge_components: merge_components
-                || matches!(self, Self::Scene(scene) if scene.is_many_objects()),
-        };
+        let mut options = simplify::Options::default();
+        options.merge_components =
+            merge_components || matches!(self, Self::Scene(scene) if scene.is_many_objects());
         let built = stage(&format!("{}: building the hierarchy", self.name()), |p| {
             simplify::build(mesh, &options, p)
         });

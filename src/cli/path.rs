@@ -9,8 +9,8 @@ use super::destination::{Content, check_file};
 use super::input::Input;
 use super::progress::stage;
 use super::say::{print, warn};
-use crate::path::{self, Path, import};
-use crate::scene::{Scene, SceneKind};
+use crate::experiment::path::{self, Path, import};
+use crate::experiment::scene::{Scene, SceneKind};
 
 pub(super) fn path(command: &PathCommand) -> Result<()> {
     match &command.command {

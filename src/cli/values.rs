@@ -5,10 +5,10 @@ use std::time::Duration;
 
 use mt_partition::CacheMode;
 
-use crate::budget::WorkCap;
-use crate::compare::Loading;
-use crate::refine::Strategy;
-use crate::store::Backend;
+use crate::experiment::compare::Loading;
+use crate::experiment::store::Backend;
+use selection::budget::WorkCap;
+use selection::refine::Strategy;
 
 pub(super) fn positive(text: &str) -> Result<f64, String> {
     match text.parse::<f64>() {

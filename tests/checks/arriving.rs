@@ -1,8 +1,8 @@
 //! A trajectory that comes to a mesh moves as a camera should there.
 
 use foldfront::Mesh;
-use foldfront::path::import::{Mode, Options};
-use foldfront::path::{Path, Summary};
+use foldfront::experiment::path::import::{Mode, Options};
+use foldfront::experiment::path::{Path, Summary};
 
 /// In every mode, a path of at least so many frames, neither at rest nor in leaps.
 pub fn comes_to_in_every_mode(mesh: &Mesh, frames: usize, import: impl Fn(&Options) -> Path) {

@@ -4,10 +4,10 @@ use std::sync::Arc;
 
 use detail_block::{Arrangement, Io, XfmFile, XfmTree};
 use foldfront::CollapseLog;
-use foldfront::active_mesh::ActiveMesh;
-use foldfront::brute_force::BruteForce;
-use foldfront::engine::{Engine, Settings};
-use foldfront::refine::Strategy;
+use foldfront::selection::active_mesh::ActiveMesh;
+use foldfront::selection::engine::{Engine, Settings};
+use foldfront::selection::refine::Strategy;
+use foldfront::testing::brute_force::BruteForce;
 use foldfront::vertex_tree::MeshSink;
 
 use crate::common::detail_block::{OwnCut, file, options, reading};

@@ -1,10 +1,10 @@
 //! Implicit dependencies of meta-nodes, against the closure by brute force.
 
 use foldfront::collapse_log::CollapseLog;
-use foldfront::cut::Displayed;
-use foldfront::engine::{Engine, Settings};
-use foldfront::oracle::Oracle;
-use foldfront::refine::Strategy;
+use foldfront::selection::engine::{Engine, Settings};
+use foldfront::selection::refine::Strategy;
+use foldfront::testing::cut::Displayed;
+use foldfront::testing::oracle::Oracle;
 use foldfront::vertex_tree::{Hierarchy, NONE, NullSink};
 use meta_node::{BuildOptions, Dependencies, MetaNodeTree};
 

@@ -5,15 +5,15 @@ use std::sync::Arc;
 use std::time::Duration;
 
 use detail_block::{Arrangement, Io, XfmFile, XfmTree};
-use foldfront::active_mesh::ActiveMesh;
-use foldfront::criterion::Criterion;
-use foldfront::engine::{Engine, Settings};
-use foldfront::front::mix;
+use foldfront::experiment::path::around;
 use foldfront::page_store::source::{Faults, Faulty, MemorySource};
-use foldfront::path::around;
-use foldfront::refine::Strategy;
+use foldfront::selection::active_mesh::ActiveMesh;
+use foldfront::selection::criterion::Criterion;
+use foldfront::selection::engine::{Engine, Settings};
+use foldfront::selection::front::mix;
+use foldfront::selection::refine::Strategy;
+use foldfront::selection::view::{View, theta_of_pixels};
 use foldfront::vertex_tree::{Hierarchy, NONE};
-use foldfront::view::{View, theta_of_pixels};
 use foldfront::{CollapseLog, Mesh};
 use glam::DVec3;
 
@@ -83,7 +83,9 @@ pub fn flies(name: &str, log: &CollapseLog, is_manifold: bool, is_closed: bool) 
         keys.sort_unstable();
         keys
     };
-    assert!(keys(&engine.sink().to_mesh()) == keys(&log.mesh), "{name}: fully refined it is not the input");
+    let (positions, triangles) = engine.sink().gathered();
+    let shown = Mesh { positions, triangles, ..Mesh::default() };
+    assert!(keys(&shown) == keys(&log.mesh), "{name}: fully refined it is not the input");
 }
 
 pub fn assert_closed(mesh: &ActiveMesh) {

@@ -2,11 +2,11 @@
 
 #![expect(clippy::disallowed_methods, reason = "random shapes and motions, or figures to compare with")]
 
-use foldfront::bvh::Bvh;
-use foldfront::criterion::Criterion;
-use foldfront::cut::{Displayed, uniform_cut};
-use foldfront::simplify::{Options, Report, build};
-use foldfront::view::{Camera, View, theta_of_pixels};
+use foldfront::construction::simplify::{Options, Report, build};
+use foldfront::experiment::bvh::Bvh;
+use foldfront::selection::criterion::Criterion;
+use foldfront::selection::view::{Camera, View, theta_of_pixels};
+use foldfront::testing::cut::{Displayed, uniform_cut};
 use foldfront::{CollapseLog, Mesh};
 use glam::DVec3;
 

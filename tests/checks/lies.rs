@@ -1,11 +1,11 @@
 //! Files that lie with checksums that agree: pages that contradict themselves or each other. A front over them may stay coarse, or end
 //! in an error that says so; it never panics, hangs, shows what can not be, or grows without end.
 
-use foldfront::engine::{Engine, Settings};
+use foldfront::selection::engine::{Engine, Settings};
 use foldfront::vertex_tree::VertexTree;
 
-use crate::common::sink::StrictMesh;
 use crate::common::{Random, random_step, random_view};
+use foldfront::testing::strict_mesh::StrictMesh;
 
 pub fn word(bytes: &[u8], at: usize) -> u32 {
     u32::from_le_bytes(bytes[at..at + 4].try_into().unwrap())

@@ -1,10 +1,10 @@
 //! A nominal pixel is a measured pixel.
 
 use foldfront::Mesh;
-use foldfront::compare::{Options, Subject};
-use foldfront::cut::{Displayed, uniform_cut};
-use foldfront::deviation::Reference;
-use foldfront::path::Path;
+use foldfront::experiment::compare::{Options, Subject};
+use foldfront::experiment::deviation::Reference;
+use foldfront::experiment::path::Path;
+use foldfront::testing::cut::{Displayed, uniform_cut};
 
 use crate::common::data;
 

@@ -2,16 +2,16 @@
 
 use std::sync::Arc;
 
-use foldfront::criterion::Criterion;
-use foldfront::engine::{Engine, Settings};
+use foldfront::selection::criterion::Criterion;
+use foldfront::selection::engine::{Engine, Settings};
+use foldfront::selection::view::View;
 use foldfront::vertex_tree::{Hierarchy, MeshSink};
-use foldfront::view::View;
 use foldfront::{CollapseLog, Mesh};
 use glam::DVec3;
 use mt_partition::{BuildOptions, MtFile, MtTree};
 
 use crate::common::graph_cut;
-use crate::common::sink::StrictMesh;
+use foldfront::testing::strict_mesh::StrictMesh;
 
 /// Advances until nothing is missing, and says after how many frames that was.
 pub fn advance_settled<M: MeshSink>(engine: &mut Engine<MtTree, M>, views: &[View]) -> usize {

@@ -4,12 +4,12 @@ use std::time::Duration;
 
 use detail_block::{Arrangement, Io, XfmTree};
 use foldfront::CollapseLog;
-use foldfront::engine::Engine;
+use foldfront::experiment::path::around;
 use foldfront::page_store::Simulated;
-use foldfront::path::around;
-use foldfront::refine::Strategy;
+use foldfront::selection::engine::Engine;
+use foldfront::selection::refine::Strategy;
+use foldfront::selection::view::theta_of_pixels;
 use foldfront::vertex_tree::{Hierarchy, NullSink, Prefetch};
-use foldfront::view::theta_of_pixels;
 
 use crate::common::backends::combinations;
 use crate::common::detail_block::{OwnCut, file, options, reading};

@@ -3,7 +3,7 @@
 use std::path::Path;
 
 use foldfront::Mesh;
-use foldfront::mesh_io::{self, Collector, MeshIoError, ReadOptions};
+use foldfront::construction::mesh_io::{self, Collector, MeshIoError, ReadOptions};
 
 /// Reads at once, and piece by piece, which has to come to the same.
 pub fn read(inputs: &[impl AsRef<Path>]) -> Result<Mesh, MeshIoError> {

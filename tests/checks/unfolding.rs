@@ -2,9 +2,9 @@
 
 use std::sync::Arc;
 
-use foldfront::active_mesh::ActiveMesh;
-use foldfront::cut::Displayed;
-use foldfront::engine::{Engine, Settings};
+use foldfront::selection::active_mesh::ActiveMesh;
+use foldfront::selection::engine::{Engine, Settings};
+use foldfront::testing::cut::Displayed;
 use foldfront::vertex_tree::{Hierarchy, NONE, Step, VertexTree};
 use foldfront::{CollapseLog, Mesh};
 use glam::DVec3;

@@ -5,11 +5,11 @@
 use std::f64::consts::PI;
 use std::time::Duration;
 
-use foldfront::budget::Budget;
-use foldfront::criterion::Criterion;
-use foldfront::engine::Settings;
-use foldfront::path::{Path, around};
-use foldfront::view::{Camera, View, theta_of_pixels};
+use foldfront::experiment::path::{Path, around};
+use foldfront::selection::budget::Budget;
+use foldfront::selection::criterion::Criterion;
+use foldfront::selection::engine::Settings;
+use foldfront::selection::view::{Camera, View, theta_of_pixels};
 use foldfront::{CollapseLog, Mesh};
 use glam::{DQuat, DVec3};
 

@@ -4,8 +4,8 @@ use std::path::Path;
 use std::sync::atomic::AtomicBool;
 
 use foldfront::collapse_log::read_log;
-use foldfront::mesh_io::{MeshIoError, Receiver};
-use foldfront::simplify::{LEAST_MEMORY, Limits, Report, build_within};
+use foldfront::construction::mesh_io::{MeshIoError, Receiver};
+use foldfront::construction::simplify::{LEAST_MEMORY, Limits, Report, build_within};
 use foldfront::{CollapseLog, Mesh};
 
 use crate::hierarchy::{check, options, simplify};

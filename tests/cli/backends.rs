@@ -2,7 +2,7 @@
 
 use std::collections::BTreeMap;
 
-use foldfront::mesh_io;
+use foldfront::construction::mesh_io;
 use serde_json::Value;
 
 use crate::workplace::{Workplace, grid};

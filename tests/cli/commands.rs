@@ -2,8 +2,8 @@
 
 use std::process::Stdio;
 
-use foldfront::mesh_io;
-use foldfront::path::Path;
+use foldfront::construction::mesh_io;
+use foldfront::experiment::path::Path;
 use serde_json::Value;
 
 use crate::workplace::{Workplace, grid, repository};

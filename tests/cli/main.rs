@@ -4,6 +4,7 @@ mod backends;
 mod commands;
 mod comparison;
 mod destinations;
+mod examples;
 mod failures;
 mod memory;
 mod workplace;

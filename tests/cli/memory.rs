@@ -18,7 +18,7 @@ fn large(side: u32) -> Mesh {
 
 fn with_large(side: u32) -> Workplace {
     let place = Workplace::new();
-    foldfront::mesh_io::write_ply(&place.file("large.ply"), &large(side), None).unwrap();
+    foldfront::construction::mesh_io::write_ply(&place.file("large.ply"), &large(side), None).unwrap();
     place
 }
 

@@ -49,7 +49,7 @@ impl Workplace {
     /// With `grid.ply` and `descent.path` in it.
     pub fn new() -> Self {
         let place = Self { folder: tempfile::tempdir().unwrap() };
-        foldfront::mesh_io::write_ply(&place.file("grid.ply"), &grid(), None).unwrap();
+        foldfront::construction::mesh_io::write_ply(&place.file("grid.ply"), &grid(), None).unwrap();
         place.write("descent.path", PATH);
         place
     }

@@ -1,6 +1,6 @@
 //! Meshes far from the origin: what goes in at a place comes out at that place.
 
-use foldfront::mesh_io;
+use foldfront::construction::mesh_io;
 
 use crate::workplace::{Workplace, grid};
 

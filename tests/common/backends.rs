@@ -8,22 +8,22 @@ use std::rc::Rc;
 use std::sync::Arc;
 
 use foldfront::CollapseLog;
-use foldfront::brute_force::BruteForce;
-use foldfront::budget::Budget;
-use foldfront::cut::Displayed;
-use foldfront::engine::{Engine, FrameReport, Settings};
-use foldfront::oracle::Oracle;
 use foldfront::page_store::source::MemorySource;
-use foldfront::refine::Strategy;
+use foldfront::selection::budget::Budget;
+use foldfront::selection::engine::{Engine, FrameReport, Settings};
+use foldfront::selection::refine::Strategy;
+use foldfront::selection::view::View;
+use foldfront::testing::brute_force::BruteForce;
+use foldfront::testing::cut::Displayed;
+use foldfront::testing::oracle::Oracle;
 use foldfront::vertex_tree::{Hierarchy, NullSink, Prefetch, Refine};
-use foldfront::view::View;
 use in_memory::{InMemoryHierarchy, InMemoryTree};
 use meta_node::{MetaNodeFile, MetaNodeTree};
 use mt_partition::{BuildOptions, MtTree};
 
 use super::graph_cut::{self, GraphCut};
 use super::quadtree::PointTree;
-use foldfront::settled::Settled;
+use foldfront::selection::settled::Settled;
 
 use super::detail_block as detail;
 
@@ -38,7 +38,7 @@ const BACKENDS: [(&str, Open); 7] = [
     }),
     ("meta-node", |log, settings| {
         // With memory for everything, all of it there from the first frame on: every frame is settled. What paging does
-        // to the cut is in `tests/meta_node`.
+        // to the cut is in `tests/backends/meta_node`.
         let file = meta_node_file(log, &meta_node::BuildOptions::default());
         follow(settings, || {
             let mut tree = MetaNodeTree::new(file.clone(), meta_node::Settings::default()).unwrap();

@@ -1,7 +1,8 @@
 //! Hierarchies of meshes.
 
-use foldfront::cut::{Displayed, uniform_cut};
-use foldfront::{CollapseLog, Mesh, simplify};
+use foldfront::construction::simplify;
+use foldfront::testing::cut::{Displayed, uniform_cut};
+use foldfront::{CollapseLog, Mesh};
 
 /// The hierarchy of a mesh.
 pub fn log(mesh: Mesh) -> CollapseLog {

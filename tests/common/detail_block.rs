@@ -9,13 +9,13 @@ use std::sync::Arc;
 
 use detail_block::{Arrangement, BuildOptions, Io, XfmFile, XfmTree};
 use foldfront::CollapseLog;
-use foldfront::budget::Budget;
-use foldfront::engine::{Engine, FrameReport, Settings};
-use foldfront::oracle::Oracle;
 use foldfront::page_store::source::MemorySource;
-use foldfront::refine::Strategy;
+use foldfront::selection::budget::Budget;
+use foldfront::selection::engine::{Engine, FrameReport, Settings};
+use foldfront::selection::refine::Strategy;
+use foldfront::selection::view::View;
+use foldfront::testing::oracle::Oracle;
 use foldfront::vertex_tree::{Hierarchy, NONE, NullSink};
-use foldfront::view::View;
 
 use super::backends::Follower;
 

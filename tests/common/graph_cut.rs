@@ -3,12 +3,12 @@
 
 use std::sync::Arc;
 
-use foldfront::criterion::Criterion;
-use foldfront::engine::Engine;
-use foldfront::front::mix;
 use foldfront::page_store::source::MemorySource;
+use foldfront::selection::criterion::Criterion;
+use foldfront::selection::engine::Engine;
+use foldfront::selection::front::mix;
+use foldfront::selection::view::View;
 use foldfront::vertex_tree::{NodeId, Refine};
-use foldfront::view::View;
 use foldfront::{Bounds, CollapseLog};
 use mt_partition::{BuildOptions, MtFile};
 

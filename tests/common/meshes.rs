@@ -4,7 +4,7 @@
 use std::collections::HashMap;
 
 use foldfront::Mesh;
-use foldfront::scene::{Scene, SceneKind};
+use foldfront::experiment::scene::{Scene, SceneKind};
 use glam::DVec3;
 
 use super::Random;

@@ -10,10 +10,9 @@ pub mod graph_cut;
 pub mod meshes;
 #[path = "../../examples/points/quadtree.rs"]
 pub mod quadtree;
-pub mod sink;
 pub mod trajectories;
 
-use foldfront::view::View;
+use foldfront::selection::view::View;
 use foldfront::{Bounds, Collapse, CollapseLog, Mesh};
 use glam::{DQuat, DVec3};
 

@@ -4,6 +4,7 @@
 //! Sources are taken as tokens: what stands in comments is none of it.
 
 mod circles;
+mod rooms;
 
 use std::collections::HashSet;
 use std::fs;

@@ -4,8 +4,8 @@ use std::path::PathBuf;
 use std::sync::OnceLock;
 
 use foldfront::CollapseLog;
-use foldfront::criterion::Criterion;
-use foldfront::path::import::{Mode, Options, import};
+use foldfront::experiment::path::import::{Mode, Options, import};
+use foldfront::selection::criterion::Criterion;
 use libtest_mimic::Trial;
 
 use crate::common::data;

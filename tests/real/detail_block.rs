@@ -1,7 +1,7 @@
 //! Trees of detail blocks of scans and cities.
 
 use foldfront::CollapseLog;
-use foldfront::simplify;
+use foldfront::construction::simplify;
 use libtest_mimic::Trial;
 
 use crate::facing::what_is_seen_from_behind_stays_coarse;

@@ -1,6 +1,6 @@
 //! A nominal pixel is a measured pixel, on scans and terrain along recorded camera paths.
 
-use foldfront::path::import::{Mode, Options, import};
+use foldfront::experiment::path::import::{Mode, Options, import};
 use libtest_mimic::Trial;
 
 use crate::kit::{self, needs};

@@ -3,7 +3,8 @@
 use std::env;
 use std::path::{Path, PathBuf};
 
-use foldfront::{CollapseLog, Mesh, mesh_io};
+use foldfront::construction::mesh_io;
+use foldfront::{CollapseLog, Mesh};
 use libtest_mimic::{Completion, Trial};
 
 use crate::common::data;

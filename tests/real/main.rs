@@ -12,7 +12,7 @@ mod meta_node;
 mod mt_partition;
 mod path;
 mod refinement;
-#[path = "../simplify/replay.rs"]
+#[path = "../construction/simplify/replay.rs"]
 mod replay;
 mod simplify;
 

@@ -3,8 +3,8 @@
 use std::path::PathBuf;
 
 use foldfront::Mesh;
-use foldfront::path::import::{Options, import};
-use foldfront::scene::{Scene, SceneKind};
+use foldfront::experiment::path::import::{Options, import};
+use foldfront::experiment::scene::{Scene, SceneKind};
 use libtest_mimic::Trial;
 
 use crate::arriving::comes_to_in_every_mode;

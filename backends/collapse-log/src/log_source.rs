@@ -4,7 +4,7 @@ use std::fs::File;
 use std::io::{self, Read, Seek, SeekFrom};
 use std::path::{Path, PathBuf};
 
-use container::Georeference;
+use vertex_tree::Georeference;
 
 use crate::external::{BackReader, Reader};
 use crate::log::{Collapse, CollapseLog};

@@ -1,6 +1,6 @@
 //! An indexed triangle mesh.
 
-use container::Georeference;
+use vertex_tree::Georeference;
 
 /// Triangles over shared vertices: the input of the simplification, and what a fully refined front shows again.
 ///

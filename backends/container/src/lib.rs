@@ -40,7 +40,6 @@
 
 mod error;
 mod file_error;
-mod georeference;
 mod layout;
 pub mod output;
 mod placing;
@@ -48,10 +47,17 @@ mod section;
 mod table;
 mod writer;
 
+#[cfg(test)]
+mod tests;
+
 pub use error::SectionError;
 pub use file_error::{FileError, read_at};
-pub use georeference::{DegreeMap, Georeference, Rounding};
 pub use layout::MOST;
 pub use section::{BY_PAGE, Extra, Kind, NECESSARY, Section};
 pub use table::Sections;
+pub use vertex_tree::{DegreeMap, Georeference, Rounding};
 pub use writer::{SectionWriter, file_length};
+
+#[cfg(doctest)]
+#[doc = include_str!("../README.md")]
+struct Readme;

@@ -17,10 +17,11 @@
 
 use std::io;
 
+use vertex_tree::{DegreeMap, Georeference, Rounding};
+
 use page_store::source::PageSource;
 
 use crate::error::SectionError;
-use crate::georeference::{DegreeMap, Georeference, Rounding};
 use crate::section::{Extra, Kind, NECESSARY};
 use crate::table::{Sections, word};
 
@@ -59,34 +60,32 @@ fn place(field: usize) -> usize {
     if field < 5 { 8 * field } else { 8 + 8 * field }
 }
 
-impl Georeference {
-    /// The section that holds it; none if there is nothing to say.
-    pub(crate) fn to_section(&self) -> io::Result<Option<Extra>> {
-        if *self == Self::default() {
-            return Ok(None);
-        }
-        let (numbers, name) = (numbers(self), self.coordinate_system.as_bytes());
-        let refuse = |why: String| Err(io::Error::new(io::ErrorKind::InvalidInput, why));
-        if let Some(field) = wrong(&numbers) {
-            return refuse(format!("{} of the georeference is {}", FIELDS[field], numbers[field]));
-        }
-        if name.len() > MOST_NAME {
-            return refuse(format!(
-                "the name of the coordinate system has {} bytes, more than {MOST_NAME}",
-                name.len()
-            ));
-        }
-        let mut bytes = vec![0; FIXED];
-        for (field, number) in numbers.iter().enumerate() {
-            bytes[place(field)..][..8].copy_from_slice(&number.to_bits().to_le_bytes());
-        }
-        let flags = if self.degrees.is_some() { FLAG_DEGREES } else { 0 };
-        bytes[40..44].copy_from_slice(&flags.to_le_bytes());
-        bytes[44..48].copy_from_slice(&(name.len() as u32).to_le_bytes());
-        bytes.extend_from_slice(name);
-        let flags = if self.origin == [0.0; 3] { 0 } else { NECESSARY };
-        Ok(Some(Extra { kind: Kind::GEOREFERENCE, flags, bytes }))
+/// The section that holds where a mesh lies; none if there is nothing to say.
+pub(crate) fn to_section(georeference: &Georeference) -> io::Result<Option<Extra>> {
+    if *georeference == Georeference::default() {
+        return Ok(None);
     }
+    let (numbers, name) = (numbers(georeference), georeference.coordinate_system.as_bytes());
+    let refuse = |why: String| Err(io::Error::new(io::ErrorKind::InvalidInput, why));
+    if let Some(field) = wrong(&numbers) {
+        return refuse(format!("{} of the georeference is {}", FIELDS[field], numbers[field]));
+    }
+    if name.len() > MOST_NAME {
+        return refuse(format!(
+            "the name of the coordinate system has {} bytes, more than {MOST_NAME}",
+            name.len()
+        ));
+    }
+    let mut bytes = vec![0; FIXED];
+    for (field, number) in numbers.iter().enumerate() {
+        bytes[place(field)..][..8].copy_from_slice(&number.to_bits().to_le_bytes());
+    }
+    let flags = if georeference.degrees.is_some() { FLAG_DEGREES } else { 0 };
+    bytes[40..44].copy_from_slice(&flags.to_le_bytes());
+    bytes[44..48].copy_from_slice(&(name.len() as u32).to_le_bytes());
+    bytes.extend_from_slice(name);
+    let flags = if georeference.origin == [0.0; 3] { 0 } else { NECESSARY };
+    Ok(Some(Extra { kind: Kind::GEOREFERENCE, flags, bytes }))
 }
 
 impl Sections {

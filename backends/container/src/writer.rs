@@ -2,8 +2,10 @@
 
 use std::io::{self, Seek, SeekFrom, Write};
 
-use crate::georeference::Georeference;
+use vertex_tree::Georeference;
+
 use crate::layout::{self, aligned};
+use crate::placing::to_section;
 use crate::section::{BY_PAGE, Extra, Kind, NECESSARY};
 use crate::table::Sections;
 
@@ -42,7 +44,7 @@ impl<W: Write + Seek> SectionWriter<W> {
         extras: &[Extra],
         kinds: &[(Kind, u32)],
     ) -> io::Result<Self> {
-        let first = georeference.to_section()?;
+        let first = to_section(georeference)?;
         let extras = || first.iter().chain(extras);
         let own = kinds.iter().map(|&(kind, flags)| (kind, NECESSARY | flags));
         let all = extras().map(|extra| (extra.kind, extra.flags)).chain(own);
@@ -145,7 +147,7 @@ pub fn file_length(
     extras: &[Extra],
     lengths: &[u64],
 ) -> io::Result<u64> {
-    let first = georeference.to_section()?;
+    let first = to_section(georeference)?;
     let extras = first.iter().chain(extras).map(|extra| extra.bytes.len() as u64);
     let all: Vec<u64> = extras.chain(lengths.iter().copied()).collect();
     let start = layout::table_end(header, all.len());

@@ -9,7 +9,6 @@ use vertex_tree::{NONE, NodeId};
 
 use crate::format::{Header, block_sum};
 use crate::node::Stored;
-use crate::node_memory::Place;
 use crate::numbering::{Owner, owner};
 
 /// A node in memory: a cache line.
@@ -73,8 +72,6 @@ pub(crate) struct Block {
     pub used: u64,
     /// When it left play, 0 while it has not.
     pub left: u64,
-    /// Where its nodes are, while it is loaded.
-    pub place: Place,
 }
 
 /// A block as it comes from the file.
@@ -158,7 +155,6 @@ impl Block {
             stamp: 0,
             used: 0,
             left: 0,
-            place: Place::default(),
         };
         Ok(Inflated { block, nodes })
     }

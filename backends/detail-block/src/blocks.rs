@@ -79,7 +79,7 @@ impl Blocks {
     /// A node of a loaded block, by its place among those.
     #[inline(always)]
     pub fn node_of(&self, block: &Block, index: usize) -> &Node {
-        self.nodes.node(block.place, index)
+        self.nodes.node(self.directory[block.number as usize].nodes, index)
     }
 
     /// A node, if its block is loaded and it is there.
@@ -161,25 +161,24 @@ impl Blocks {
         parent != NONE && self.is_active(NodeId(parent))
     }
 
-    pub fn insert(&mut self, Inflated { mut block, nodes }: Inflated) {
+    pub fn insert(&mut self, Inflated { block, nodes }: Inflated) {
         self.stubs.remove(&block.number);
         self.bytes += resident_bytes(block.count());
-        block.place = self.nodes.insert(&nodes);
-        let (number, flags, nodes) = (block.number, block.flags, block.place);
+        let (number, flags, nodes) = (block.number, block.flags, self.nodes.insert(&nodes));
         let slot = self.loaded.insert(block) as u32;
         self.directory[number as usize] = Entry { flags, nodes, slot };
     }
 
     /// Removes a block that is loaded.
     pub fn remove(&mut self, number: u32) -> Block {
-        let Entry { slot, .. } = std::mem::take(&mut self.directory[number as usize]);
+        let Entry { nodes, slot, .. } = std::mem::take(&mut self.directory[number as usize]);
         let block = self.loaded.remove(slot as usize);
         self.bytes -= resident_bytes(block.count());
         if block.parent != NONE && self.is_active(NodeId(block.parent)) {
-            let stub = Stub { bounds: self.node_of(&block, 0).stored.bounds(), parent: block.parent };
+            let stub = Stub { bounds: self.nodes.node(nodes, 0).stored.bounds(), parent: block.parent };
             self.stubs.insert(number, stub);
         }
-        self.nodes.remove(block.place);
+        self.nodes.remove(nodes);
         block
     }
 

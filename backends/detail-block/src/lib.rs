@@ -4,14 +4,14 @@
 //!
 //! ```
 //! # use std::sync::Arc;
-//! # use detail_block::{BuildOptions, Settings, XfmFile, XfmTree};
+//! # use foldfront_detail_block::{BuildOptions, Settings, XfmFile, XfmTree};
 //! # use page_store::source::FileSource;
 //! # use collapse_log::CollapseLog;
 //! # use vertex_tree::{NullSink, Hierarchy, VertexTree};
 //! # fn main() -> Result<(), Box<dyn std::error::Error>> {
 //! # let (log, folder) = (CollapseLog::default(), tempfile::tempdir()?);
 //! # let path = &folder.path().join("empty.xfm");
-//! detail_block::write(path, &log, &BuildOptions::default())?; // once a model
+//! foldfront_detail_block::write(path, &log, &BuildOptions::default())?; // once a model
 //! let file = Arc::new(XfmFile::open(Arc::new(FileSource::open(path)?))?); // once a process
 //! let mut tree = XfmTree::new(file, Settings::default())?; // once a viewer
 //! tree.base_mesh(&mut NullSink)?;
@@ -62,6 +62,9 @@ mod waiting;
 mod well_formed;
 mod writing;
 
+#[cfg(test)]
+mod tests;
+
 pub use arrangement::Arrangement;
 pub use build::{needed_bytes, needed_disk_bytes, write, write_within};
 pub use collapse_log::external::{Workspace, WorkspaceError};
@@ -74,3 +77,7 @@ pub use paging::{ATTEMPTS, PagingCounts};
 pub use returns::SOON;
 pub use settings::{Io, Settings};
 pub use tree::XfmTree;
+
+#[cfg(doctest)]
+#[doc = include_str!("../README.md")]
+struct Readme;

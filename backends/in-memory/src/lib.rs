@@ -3,7 +3,7 @@
 //! ```
 //! # use collapse_log::CollapseLog;
 //! # use vertex_tree::{NullSink, Hierarchy, VertexTree};
-//! # use in_memory::{InMemoryHierarchy, InMemoryTree};
+//! # use foldfront_in_memory::{InMemoryHierarchy, InMemoryTree};
 //! # use std::sync::Arc;
 //! # fn main() -> Result<(), Box<dyn std::error::Error>> {
 //! # let log = CollapseLog::default();
@@ -19,3 +19,7 @@ mod tree;
 
 pub use hierarchy::InMemoryHierarchy;
 pub use tree::InMemoryTree;
+
+#[cfg(doctest)]
+#[doc = include_str!("../README.md")]
+struct Readme;

@@ -7,14 +7,14 @@
 //!
 //! ```no_run
 //! # use std::{path::Path, sync::Arc};
-//! # use meta_node::{BuildOptions, MetaNodeFile, MetaNodeTree, Settings};
+//! # use foldfront_meta_node::{BuildOptions, MetaNodeFile, MetaNodeTree, Settings};
 //! # use collapse_log::CollapseLog;
 //! # use page_store::source::FileSource;
 //! # use vertex_tree::{NullSink, Hierarchy, VertexTree};
 //! # fn main() -> Result<(), Box<dyn std::error::Error>> {
 //! # let log = CollapseLog::default();
 //! let path = Path::new("dragon.fold");
-//! meta_node::write(path, &log, &BuildOptions::default())?; // once
+//! foldfront_meta_node::write(path, &log, &BuildOptions::default())?; // once
 //! let file = Arc::new(MetaNodeFile::open(Arc::new(FileSource::open(path)?))?); // once a model
 //! let settings = Settings { page_memory: 16 << 20, ..Settings::default() };
 //! let mut tree = MetaNodeTree::new(file, settings)?; // once a viewer
@@ -46,6 +46,9 @@ mod tree;
 mod verify;
 mod write;
 
+#[cfg(test)]
+mod tests;
+
 pub use collapse_log::external::{Workspace, WorkspaceError};
 pub use container::FileError;
 pub use dependencies::Dependencies;
@@ -55,3 +58,7 @@ pub use format::MAGIC;
 pub use settings::{InUse, Io, Settings};
 pub use tree::MetaNodeTree;
 pub use write::{BuildOptions, WriteReport, write, write_within};
+
+#[cfg(doctest)]
+#[doc = include_str!("../README.md")]
+struct Readme;

@@ -6,7 +6,7 @@
 //! # use page_store::source::FileSource;
 //! # use collapse_log::CollapseLog;
 //! # use vertex_tree::{NullSink, Hierarchy, VertexTree};
-//! # use mt_partition::{BuildOptions, MtFile, MtTree, Settings, write};
+//! # use foldfront_mt_partition::{BuildOptions, MtFile, MtTree, Settings, write};
 //! # fn main() -> Result<(), Box<dyn std::error::Error>> {
 //! # let folder = tempfile::tempdir()?;
 //! # let path = folder.path().join("example.mt");
@@ -63,3 +63,7 @@ pub use options::BuildOptions;
 pub use partition::QueueOrder;
 pub use reader::Reader;
 pub use tree::{MtTree, Settings};
+
+#[cfg(doctest)]
+#[doc = include_str!("../README.md")]
+struct Readme;

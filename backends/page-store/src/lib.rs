@@ -26,9 +26,16 @@ pub mod source;
 mod store;
 mod sync;
 
+#[cfg(test)]
+mod tests;
+
 pub use failures::Failures;
 pub use pages::Pages;
 pub use queue::NOW;
 pub use requests::{Arrival, Requests, Ticket};
 pub use simulated::Simulated;
 pub use store::{Store, ThreadError};
+
+#[cfg(doctest)]
+#[doc = include_str!("../README.md")]
+struct Readme;

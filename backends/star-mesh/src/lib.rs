@@ -23,3 +23,7 @@ mod stars;
 
 pub use leaf_triangle::LeafTriangle;
 pub use star_mesh::StarMesh;
+
+#[cfg(doctest)]
+#[doc = include_str!("../README.md")]
+struct Readme;

@@ -15,6 +15,7 @@
 
 mod bounds;
 mod error;
+mod georeference;
 mod hierarchy;
 mod paging;
 mod prefetch;
@@ -23,8 +24,13 @@ mod tree;
 
 pub use bounds::{Bounds, NormalCone};
 pub use error::TreeError;
+pub use georeference::{DegreeMap, Georeference, Rounding};
 pub use hierarchy::{Hierarchy, NodeId, Refine, Step};
 pub use paging::{PageStats, Prefetch};
 pub use prefetch::prefetch;
 pub use sink::{MeshSink, NONE, NullSink, TriangleId, VertexId};
 pub use tree::VertexTree;
+
+#[cfg(doctest)]
+#[doc = include_str!("../README.md")]
+struct Readme;

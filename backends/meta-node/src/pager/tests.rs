@@ -10,10 +10,8 @@ use vertex_tree::{NONE, Prefetch};
 use super::Pager;
 use crate::lists::Class;
 use crate::page::Layout;
+use crate::tests::common;
 use crate::{BuildOptions, InUse, Io, MetaNodeFile, Settings};
-
-#[path = "../../tests/common/mod.rs"]
-mod common;
 
 /// A pager over some hundred small pages with memory for all but one of the largest, so that it goes on counting.
 fn pager(in_use: InUse, prefetch: Prefetch) -> Pager {

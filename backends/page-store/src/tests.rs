@@ -1,0 +1,3 @@
+//! What the crate does as others see it.
+
+mod virtual_time;
