@@ -26,7 +26,7 @@ use std::path::Path;
 use std::process::Command;
 use std::time::Instant;
 
-use collapse_log::external::{Scratch, Sorter};
+use foldfront_collapse_log::external::{Scratch, Sorter};
 use ext_sort::{ExternalChunk, ExternalSorterBuilder, LimitedBufferBuilder};
 
 const CONTENDERS: [&str; 3] = ["ours", "extsort", "ext-sort"];
