@@ -30,6 +30,9 @@ mod slot_table;
 pub mod view;
 mod waiting;
 
+pub use glam;
+pub use vertex_tree;
+
 #[cfg(doctest)]
 #[doc = include_str!("README.md")]
 struct Readme;

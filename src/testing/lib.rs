@@ -11,6 +11,8 @@ pub mod strict_mesh;
 pub mod walk;
 
 pub use conformance::{conforms, conforms_with_mesh};
+pub use selection;
+pub use vertex_tree;
 
 #[cfg(test)]
 mod tests;

@@ -67,16 +67,19 @@ mod tests;
 
 pub use arrangement::Arrangement;
 pub use build::{needed_bytes, needed_disk_bytes, write, write_within};
+pub use collapse_log;
 pub use collapse_log::external::{Workspace, WorkspaceError};
 pub use container::FileError;
 pub use error::XfmError;
 pub use file::XfmFile;
 pub use format::MAGIC;
 pub use options::{BuildOptions, WriteReport};
+pub use page_store;
 pub use paging::{ATTEMPTS, PagingCounts};
 pub use returns::SOON;
 pub use settings::{Io, Settings};
 pub use tree::XfmTree;
+pub use vertex_tree;
 
 #[cfg(doctest)]
 #[doc = include_str!("../README.md")]

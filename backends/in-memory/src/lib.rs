@@ -17,8 +17,10 @@
 mod hierarchy;
 mod tree;
 
+pub use collapse_log;
 pub use hierarchy::InMemoryHierarchy;
 pub use tree::InMemoryTree;
+pub use vertex_tree;
 
 #[cfg(doctest)]
 #[doc = include_str!("../README.md")]

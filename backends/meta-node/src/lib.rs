@@ -49,14 +49,17 @@ mod write;
 #[cfg(test)]
 mod tests;
 
+pub use collapse_log;
 pub use collapse_log::external::{Workspace, WorkspaceError};
 pub use container::FileError;
 pub use dependencies::Dependencies;
 pub use error::MetaNodeError;
 pub use file::MetaNodeFile;
 pub use format::MAGIC;
+pub use page_store;
 pub use settings::{InUse, Io, Settings};
 pub use tree::MetaNodeTree;
+pub use vertex_tree;
 pub use write::{BuildOptions, WriteReport, write, write_within};
 
 #[cfg(doctest)]

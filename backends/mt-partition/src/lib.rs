@@ -53,6 +53,7 @@ mod verify;
 
 pub use build::{LEAST_MEMORY, WriteReport, write, write_within};
 pub use cache::CacheMode;
+pub use collapse_log;
 pub use collapse_log::external::{Workspace, WorkspaceError};
 pub use container::FileError;
 pub use error::MtError;
@@ -60,9 +61,11 @@ pub use file::{MtFile, StoredNode};
 pub use format::MAGIC;
 pub use memory::Memory;
 pub use options::BuildOptions;
+pub use page_store;
 pub use partition::QueueOrder;
 pub use reader::Reader;
 pub use tree::{MtTree, Settings};
+pub use vertex_tree;
 
 #[cfg(doctest)]
 #[doc = include_str!("../README.md")]
