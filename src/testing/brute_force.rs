@@ -10,6 +10,7 @@ use std::ops::ControlFlow;
 use glam::DVec3;
 use vertex_tree::{Bounds, Hierarchy, NodeId, NormalCone, NullSink, Refine, Step, TreeError};
 
+use selection::criterion::is_nested;
 use selection::engine::{Engine, Settings};
 use selection::front::mix;
 use selection::normal_cone;
@@ -99,7 +100,7 @@ impl BruteForce {
         (middle.to_array(), roots().map(reach).fold(0.0, f64::max))
     }
 
-    /// Checks that what is below a node is within its sphere and has no larger error (see [`Bounds`]), up to a millionth.
+    /// Checks that whatever view wants a node wants those above it too, see [`is_nested`].
     ///
     /// # Panics
     /// At the first node that sticks out.
@@ -108,11 +109,10 @@ impl BruteForce {
         for (at, node) in self.nodes.iter().enumerate() {
             for &parent in &node.parents {
                 let (below, above) = (node.bounds, self.nodes[parent as usize].bounds);
-                let apart = DVec3::from(below.center.map(f64::from))
-                    .distance(DVec3::from(above.center.map(f64::from)));
-                let reach = apart + f64::from(below.radius);
-                let is_within = reach <= f64::from(above.radius) * (1.0 + 1e-6) && below.eps <= above.eps;
-                assert!(is_within, "node {at}, {below:?}, sticks out of one above it, {above:?}");
+                assert!(
+                    is_nested(&below, &above),
+                    "node {at}, {below:?}, sticks out of one above it, {above:?}"
+                );
             }
         }
     }
