@@ -37,11 +37,12 @@ use meta_node::MetaNodeTree;
 use mt_partition::MtTree;
 use vertex_tree::{NullSink, Refine, TreeError};
 
-pub use self::any::{Named, replay_any};
+pub use self::any::replay_any;
 pub use self::error::{CompareError, WrongCut};
 pub use self::loading::Loading;
 use self::opening::Opening;
 pub use self::options::{Options, Pace, Paging};
+pub use self::replay::Named;
 use self::replay::Replay;
 use self::run::Check;
 pub use self::run::{Row, Run};
@@ -278,6 +279,11 @@ impl Subject {
             progress(done, total);
         };
 
+        let named = Named {
+            scene: &self.name,
+            backend: backend.name(),
+            has_dependencies: backend.has_dependencies(options.paging.dependencies),
+        };
         let mut runs: Vec<Run> = Vec::new();
         // Those that are yet to be compared with an exact strategy.
         let mut uncompared = Vec::new();
@@ -286,34 +292,18 @@ impl Subject {
             for &strategy in &options.strategies {
                 let settings = options.settings(strategy, &speed);
                 let frames = frames.clone();
-                let replay = Replay {
-                    scene: &self.name,
-                    backend: backend.name(),
-                    has_dependencies: backend.has_dependencies(options.paging.dependencies),
-                    path,
-                    frames,
-                    views: &views,
-                    settings,
-                    opening,
-                };
+                let replay = Replay { named, path, frames, views: &views, settings, opening };
                 let rows = with_trees!(self, |open| {
                     let mut rows = replay.measure(open(opening)?, &mut count)?;
-                    match check.as_mut() {
-                        _ if !is_checked(strategy) => {}
-                        Some(check) => replay.check(open(opening)?, check, &mut rows, &mut count)?,
-                        None => uncompared.push((runs.len(), replay)),
+                    if let Some(check) = check.as_mut().filter(|_| is_checked(strategy)) {
+                        replay.check(open(opening)?, check, &mut rows, &mut count)?;
                     }
                     rows
                 });
-                runs.push(Run {
-                    scene: self.name.clone(),
-                    path: path.name.clone(),
-                    backend: self.backend().name(),
-                    strategy,
-                    prefetch,
-                    speed,
-                    rows,
-                });
+                runs.push(replay.run_of(prefetch, speed, rows));
+                if is_checked(strategy) && check.is_none() {
+                    uncompared.push((runs.len() - 1, replay));
+                }
             }
         }
         for (at, wrong) in self.compare(uncompared, &mut count)? {

@@ -35,6 +35,12 @@ const CHECK_EVERY: u64 = 25;
 /// or the backend's own state is wrong; and if the hierarchy has no nodes, or the walk changes nothing, which would prove nothing.
 #[track_caller]
 pub fn conforms<T: Refine<NullSink>>(mut open: impl FnMut() -> T) -> Totals {
+    follow(&mut open).0
+}
+
+/// [`conforms`], with the brute-force cut that it was compared with.
+#[track_caller]
+fn follow<T: Refine<NullSink>>(open: &mut impl FnMut() -> T) -> (Totals, BruteForce) {
     let mut whole = Settled::new(open());
     whole.start(&mut NullSink).expect("a hierarchy that starts");
     let mut brute_force = BruteForce::new(&mut whole).expect("a hierarchy that unfolds");
@@ -54,6 +60,8 @@ pub fn conforms<T: Refine<NullSink>>(mut open: impl FnMut() -> T) -> Totals {
     let mut totals = Totals { nodes: brute_force.node_count() as u64, ..Totals::default() };
     for frame in 0..u64::from(Walk::FRAMES) {
         let views: Vec<View> = walk.next_views().to_vec();
+        // What is compared does not depend on the strategy.
+        let cut = brute_force.cut(engines[0].settings(), &views);
         for (at, engine) in engines.iter_mut().enumerate() {
             let report = engine.advance_relative(&views).expect("a frame");
             if frame < EVERY_FRAME || frame.is_multiple_of(CHECK_EVERY) {
@@ -62,7 +70,6 @@ pub fn conforms<T: Refine<NullSink>>(mut open: impl FnMut() -> T) -> Totals {
             let strategy = engine.settings().strategy;
             let name = strategy.name();
             assert_eq!(report.misses, 0, "{name}, frame {frame}: what has been waited for is there");
-            let cut = brute_force.cut(engine.settings(), &views);
             if (report.cut_hash, report.active_nodes) != (cut.hash, cut.nodes) {
                 let wrong = brute_force.wrong(engine);
                 let forced = report.forced;
@@ -82,7 +89,7 @@ pub fn conforms<T: Refine<NullSink>>(mut open: impl FnMut() -> T) -> Totals {
         totals.frames += 1;
     }
     assert!(totals.changes > 0, "a walk that changes nothing proves nothing");
-    totals
+    (totals, brute_force)
 }
 
 /// [`conforms`], and what a mesh backend tells a sink: in every frame of the walk the mesh is one that can be, with as many triangles as
@@ -92,10 +99,8 @@ pub fn conforms<T: Refine<NullSink>>(mut open: impl FnMut() -> T) -> Totals {
 /// As [`conforms`], and at the first call that a sink could not have followed.
 #[track_caller]
 pub fn conforms_with_mesh<T: VertexTree>(mut open: impl FnMut() -> T) -> Totals {
-    let totals = conforms(&mut open);
-    let mut whole = Settled::new(open());
-    whole.start(&mut NullSink).expect("a hierarchy that starts");
-    let (center, radius) = BruteForce::new(&mut whole).expect("a hierarchy that unfolds").sphere();
+    let (totals, brute_force) = follow(&mut open);
+    let (center, radius) = brute_force.sphere();
     let mut walk = Walk::new(center, radius, 2);
     let [rho, omega] = walk.speed();
     let settings = Settings { rho, omega, ..Settings::default() };
@@ -108,7 +113,6 @@ pub fn conforms_with_mesh<T: VertexTree>(mut open: impl FnMut() -> T) -> Totals 
         assert_eq!(shown, report.displayed, "frame {frame}: triangles");
     }
     engine.advance_relative(&[]).expect("a frame");
-    let shape = |mesh: &StrictMesh| mesh.shape();
-    assert_eq!(shape(engine.sink()), shape(&base), "wholly folded it is not the base mesh");
+    assert_eq!(engine.sink().shape(), base.shape(), "wholly folded it is not the base mesh");
     totals
 }

@@ -45,8 +45,8 @@ const PLATFORM: [&str; 24] = [
     "acosh", "atanh", "exp", "exp2", "exp_m1", "ln", "ln_1p", "log2", "log10", "powf", "cbrt", "hypot",
 ];
 
-/// A source file below a folder, by its name from the root, and its tokens, what is tests or is not compiled without files left out.
-fn sources(folder: &str) -> Vec<(String, Vec<String>)> {
+/// The source files below a folder, in order: names from the root, and texts.
+fn texts(folder: &str) -> Vec<(String, String)> {
     let mut files = Vec::new();
     let mut folders = vec![PathBuf::from(ROOT).join(folder)];
     while let Some(folder) = folders.pop() {
@@ -56,12 +56,21 @@ fn sources(folder: &str) -> Vec<(String, Vec<String>)> {
                 folders.push(path);
             } else if path.extension().is_some_and(|extension| extension == "rs") {
                 let name = path.strip_prefix(ROOT).unwrap().to_str().unwrap().replace('\\', "/");
-                files.push((name, tokens(&fs::read_to_string(&path).unwrap())));
+                files.push((name, fs::read_to_string(&path).unwrap()));
             }
         }
     }
     files.sort();
-    // Whole files that are switched off where they are declared.
+    files
+}
+
+/// The same as tokens.
+fn sources(folder: &str) -> Vec<(String, Vec<String>)> {
+    texts(folder).into_iter().map(|(name, text)| (name, tokens(&text))).collect()
+}
+
+/// Those that are compiled without features and tests: whole files may be switched off where they are declared.
+fn without_features(mut files: Vec<(String, Vec<String>)>) -> Vec<(String, Vec<String>)> {
     let mut off = BTreeSet::new();
     for (name, tokens) in &files {
         let folder = name.trim_end_matches("/lib.rs").trim_end_matches(".rs");
@@ -159,7 +168,7 @@ fn the_smallest_build_has_no_file_no_thread_no_clock() {
     let mut faults = Vec::new();
     let mut files = 0;
     for folder in SMALLEST {
-        for (name, tokens) in sources(folder) {
+        for (name, tokens) in without_features(sources(folder)) {
             files += 1;
             faults.extend(forbidden(&tokens).into_iter().map(|what| format!("{name}: {what}")));
         }
@@ -367,9 +376,7 @@ fn every_error_names_a_file_or_a_value() {
     let (mut faults, mut count) = (Vec::new(), 0);
     let folders = FLOORS.iter().map(|(folder, _)| *folder).chain(["src/experiment", "src/cli"]);
     for folder in folders {
-        let mut files = Vec::new();
-        texts(&Path::new(ROOT).join(folder), &mut files);
-        for (name, text) in files {
+        for (name, text) in texts(folder) {
             for message in text.split("#[error(").skip(1) {
                 let message = message.trim_start();
                 count += 1;
@@ -384,15 +391,4 @@ fn every_error_names_a_file_or_a_value() {
     }
     assert!(count > 150, "{count} errors: where are the others?");
     assert!(faults.is_empty(), "{}", faults.join("\n"));
-}
-
-fn texts(folder: &Path, files: &mut Vec<(String, String)>) {
-    for entry in fs::read_dir(folder).unwrap() {
-        let path = entry.unwrap().path();
-        if path.is_dir() {
-            texts(&path, files);
-        } else if path.extension().is_some_and(|extension| extension == "rs") {
-            files.push((path.display().to_string(), fs::read_to_string(&path).unwrap()));
-        }
-    }
 }

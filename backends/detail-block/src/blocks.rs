@@ -76,12 +76,6 @@ impl Blocks {
         self.loaded.iter().map(|(_, block)| block)
     }
 
-    /// A node of a loaded block, by its place among those.
-    #[inline(always)]
-    pub fn node_of(&self, block: &Block, index: usize) -> &Node {
-        self.nodes.node(self.directory[block.number as usize].nodes, index)
-    }
-
     /// A node, if its block is loaded and it is there.
     #[inline(always)]
     pub fn node(&self, node: NodeId) -> Option<&Node> {

@@ -88,17 +88,17 @@ pub(crate) fn peek(blocks: &Blocks, node: NodeId, children: &mut Vec<(NodeId, Bo
     if let Some(i) = offset.checked_sub(levels.lowest()) {
         let before = children.len();
         for child in [2 * i, 2 * i + 1].into_iter().filter_map(|place| block.child_block(place)) {
-            let Some(below) = blocks.block(child) else {
+            let root = levels.node(child, 0);
+            let Some(below) = blocks.node(root) else {
                 children.truncate(before);
                 return false;
             };
-            children.push((levels.node(child, 0), blocks.node_of(below, 0).stored.bounds()));
+            children.push((root, below.stored.bounds()));
         }
     } else {
         for below in [2 * offset + 1, 2 * offset + 2] {
-            if let Some(index) = block.index_of(below) {
-                children.push((levels.node(number, below), blocks.node_of(block, index).stored.bounds()));
-            }
+            let child = levels.node(number, below);
+            children.extend(blocks.node(child).map(|node| (child, node.stored.bounds())));
         }
     }
     true

@@ -21,9 +21,8 @@ impl XfmTree {
             bytes += crate::block::resident_bytes(block.count());
             let mut active = 0;
             for offset in 0..levels.full() {
-                let Some(index) = block.index_of(offset) else { continue };
-                let (id, node) =
-                    (levels.node(block.number, offset), self.paging.blocks.node_of(block, index));
+                let id = levels.node(block.number, offset);
+                let Some(node) = self.paging.blocks.node(id) else { continue };
                 if !node.is_active() {
                     assert_eq!((node.needed_by(), node.slots), (0, [NONE; 2]), "folded node {id:?}");
                     continue;

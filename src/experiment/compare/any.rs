@@ -11,20 +11,9 @@ use super::error::CompareError;
 use super::loading::Loading;
 use super::opening::Opening;
 use super::options::Options;
-use super::replay::Replay;
+use super::replay::{Named, Replay};
 use super::run::{Check, Run};
 use crate::experiment::path::Path;
-
-/// A tree of whatever backend, that is compared: what it is of, and what the backend is called.
-#[derive(Clone, Copy, Debug)]
-pub struct Named<'a> {
-    /// What is walked through.
-    pub scene: &'a str,
-    /// The backend, as in a report.
-    pub backend: &'static str,
-    /// Whether a node may wait for one that is neither above nor below it.
-    pub has_dependencies: bool,
-}
 
 /// Replays `frames` of a path with every strategy of the options, over the trees that `open` gives, each of which is wholly folded and
 /// started by nobody. How they page, and on what time, is `open`'s to say; [`Options::paging`] and [`Options::prefetch`] are not looked at, and
@@ -56,9 +45,7 @@ pub fn replay_any<T: VertexTree>(
     let mut runs = Vec::with_capacity(options.strategies.len());
     for (at, &strategy) in options.strategies.iter().enumerate() {
         let replay = Replay {
-            scene: named.scene,
-            backend: named.backend,
-            has_dependencies: named.has_dependencies,
+            named,
             path,
             frames: frames.clone(),
             views: &views,
@@ -67,24 +54,17 @@ pub fn replay_any<T: VertexTree>(
         };
         let mut rows = replay.measure(opening.wrap(open().map_err(wrap)?), &mut count)?;
         if is_checked(at) {
-            if check.is_none() {
-                let mut whole = Opening::SETTLED.wrap(open().map_err(wrap)?);
-                whole.start(&mut NullSink).map_err(wrap)?;
-                check = Some(Check::Nodes(BruteForce::new(&mut whole).map_err(wrap)?));
-            }
-            if let Some(check) = &mut check {
-                replay.check(opening.wrap(open().map_err(wrap)?), check, &mut rows, &mut count)?;
-            }
+            let check = match &mut check {
+                Some(check) => check,
+                none => {
+                    let mut whole = Opening::SETTLED.wrap(open().map_err(wrap)?);
+                    whole.start(&mut NullSink).map_err(wrap)?;
+                    none.insert(Check::Nodes(BruteForce::new(&mut whole).map_err(wrap)?))
+                }
+            };
+            replay.check(opening.wrap(open().map_err(wrap)?), check, &mut rows, &mut count)?;
         }
-        runs.push(Run {
-            scene: named.scene.to_owned(),
-            path: path.name.clone(),
-            backend: named.backend,
-            strategy,
-            prefetch: Loading::None,
-            speed,
-            rows,
-        });
+        runs.push(replay.run_of(Loading::None, speed, rows));
     }
     Ok(runs)
 }

@@ -6,21 +6,31 @@ use std::time::{Duration, Instant};
 use vertex_tree::{Hierarchy, NodeId, NullSink, Refine, TreeError, VertexTree};
 
 use super::error::{CompareError, WrongCut};
+use super::loading::Loading;
 use super::opening::Opening;
 use super::options::Pace;
-use super::run::{Check, Row};
+use super::run::{Check, Row, Run};
 use crate::experiment::path::Path;
 use selection::active_mesh::ActiveMesh;
 use selection::engine::{Engine, FrameReport, Settings};
+use selection::motion::Speed;
 use selection::refine::Strategy;
 use selection::settled::Settled;
 use selection::view::View;
 
-pub(super) struct Replay<'a> {
+/// A tree of whatever backend, that is compared: what it is of, and what the backend is called.
+#[derive(Clone, Copy, Debug)]
+pub struct Named<'a> {
+    /// What is walked through.
     pub scene: &'a str,
+    /// The backend, as in a report.
     pub backend: &'static str,
     /// Whether a node may wait for one that is neither above nor below it.
     pub has_dependencies: bool,
+}
+
+pub(super) struct Replay<'a> {
+    pub named: Named<'a>,
     pub path: &'a Path,
     pub frames: Range<usize>,
     pub views: &'a [View],
@@ -33,7 +43,20 @@ const FIRST_ROUNDS: usize = 200;
 
 impl Replay<'_> {
     fn tree_error(&self, source: TreeError) -> CompareError {
-        CompareError::Tree { scene: self.scene.to_owned(), source }
+        CompareError::Tree { scene: self.named.scene.to_owned(), source }
+    }
+
+    /// What has been measured as a run.
+    pub fn run_of(&self, prefetch: Loading, speed: Speed, rows: Vec<Row>) -> Run {
+        Run {
+            scene: self.named.scene.to_owned(),
+            path: self.path.name.clone(),
+            backend: self.named.backend,
+            strategy: self.settings.strategy,
+            prefetch,
+            speed,
+            rows,
+        }
     }
 
     /// Replays the path, and calls `after` with each frame, its view and its report.
@@ -118,7 +141,7 @@ impl Replay<'_> {
             // What is carried over or blocked is not wrong, it is late, and what was refused keeps back just what depends
             // on it.
             let is_exact = self.settings.strategy.is_exact() && report.carried + report.blocked == 0;
-            let (scene, path) = (self.scene.to_owned(), self.path.name.clone());
+            let (scene, path) = (self.named.scene.to_owned(), self.path.name.clone());
             let wrong = match check {
                 Check::Log(oracle) => {
                     let difference = oracle.compare(engine);
@@ -136,9 +159,9 @@ impl Replay<'_> {
                     difference.map_or(0, |d| d.count as u64)
                 }
                 Check::Nodes(brute_force) => {
-                    let [wrong, unexplained] = brute_force.judge(engine, self.has_dependencies);
+                    let [wrong, unexplained] = brute_force.judge(engine, self.named.has_dependencies);
                     if unexplained > 0 && is_exact {
-                        let (strategy, backend) = (self.settings.strategy.name(), self.backend);
+                        let (strategy, backend) = (self.settings.strategy.name(), self.named.backend);
                         let wrong = unexplained;
                         return Err(CompareError::Differs { scene, path, frame, strategy, backend, wrong });
                     }
