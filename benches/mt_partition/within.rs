@@ -9,6 +9,8 @@ use foldfront::CollapseLog;
 use foldfront::page_store::source::FileSource;
 use foldfront::vertex_tree::NodeId;
 use mt_partition::{BuildOptions, MtFile, Workspace};
+use rand::{RngExt, SeedableRng};
+use rand_pcg::Pcg64;
 
 /// Tolerance of one pixel in an image of 1080 lines with a field of view of 60 degrees.
 const K: f64 = 935.0;
@@ -35,16 +37,12 @@ fn displayed(file: &MtFile, errors: &[f32], eyes: &[[f64; 3]]) -> Vec<i64> {
 /// 64 eyes, in the box of the mesh and up to four times as far away.
 fn eyes(log: &CollapseLog) -> Vec<[f64; 3]> {
     let (lo, hi) = log.mesh.bounding_box().unwrap_or_default();
-    let mut state = 7_u64;
-    let mut random = || {
-        // The generator of Knuth's MMIX; its high bits.
-        state = state.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
-        (state >> 33) as f64 / f64::from(1_u32 << 31) - 0.5
-    };
+    let mut random = Pcg64::seed_from_u64(7);
+    let mut share = || random.random_range(-0.5..0.5);
     let [lo, hi] = [lo, hi].map(|corner| corner.map(f64::from));
     let extent = (0..3).map(|i| hi[i] - lo[i]).fold(0.0, f64::max);
     let reach = [0.0, 0.2, 1.0, 4.0].map(|times| times * extent);
-    let eye = |n: usize| [0, 1, 2].map(|i| (lo[i] + hi[i]) / 2.0 + random() * (hi[i] - lo[i] + reach[n % 4]));
+    let eye = |n: usize| [0, 1, 2].map(|i| (lo[i] + hi[i]) / 2.0 + share() * (hi[i] - lo[i] + reach[n % 4]));
     (0..64).map(eye).collect()
 }
 

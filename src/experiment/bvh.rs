@@ -1,5 +1,7 @@
 //! The nearest point on a triangle soup, by a flat bounding-volume hierarchy.
 //!
+//! By hand: the bits of every answer depend on the order of its operations, and a library may change that.
+//!
 //! The hierarchy is split by the surface area heuristic over bins of the widest axis (Wald 2007, "On fast
 //! Construction of SAH-based Bounding Volume Hierarchies"). Boxes are exact, since coordinates are `f32`; distances
 //! are computed in `f64`. The tree and every answer are the same whatever the number of threads.

@@ -1,4 +1,6 @@
 //! The comparison as one self-contained HTML page: tables, curves and pictures.
+//!
+//! The page is written by hand for now, as the axes of the curves are drawn: both will be made anew together.
 
 mod figures;
 mod section;

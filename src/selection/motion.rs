@@ -262,4 +262,127 @@ mod tests {
             assert!(matches!(motion, Motion::Frames(frames) if frames >= 1.0), "{step}: {motion:?}");
         }
     }
+
+    /// Frames of a motion from the view at 0 to another one.
+    fn frames(course: &Course, after: View) -> f64 {
+        match Odometer::default().advance(course, &[view(0.0)], &[after]) {
+            Motion::Frames(frames) => frames,
+            motion => panic!("{motion:?}"),
+        }
+    }
+
+    #[track_caller]
+    fn assert_about(found: f64, expected: f64) {
+        assert!((found / expected - 1.0).abs() < 1e-9, "{found}, not {expected}");
+    }
+
+    /// The clock runs by whatever of the motion takes longest at its speed.
+    #[test]
+    fn a_motion_takes_as_long_as_the_slowest_part_of_it() {
+        let full = Course::from(FULL);
+        let to = |x: f64, y: f64, z: f64| view(0.0).with_eye(DVec3::new(x, y, z)).unwrap();
+        assert_about(frames(&full, to(1.0, 2.0, -2.0)), 3.0 / 0.5);
+        // A turn by the angle whose tangent is 3/4, and a tolerance that gets coarser or finer.
+        let turned = view(0.0).with_direction(DVec3::new(0.6, 0.0, 0.8)).unwrap();
+        assert_about(frames(&full, turned), libm::atan2(0.6, 0.8) / 0.1);
+        let about = view(0.0).with_direction(-DVec3::Z).unwrap();
+        assert_about(frames(&full, about), std::f64::consts::PI / 0.1);
+        assert_about(frames(&full, view(0.0).with_k(14.0).unwrap()), 4.0);
+        assert_about(frames(&full, view(0.0).with_k(7.0).unwrap()), 3.0);
+        // All of it at once.
+        let all = |x: f64, k: f64| {
+            turned.with_eye(DVec3::new(x, 0.0, 0.0)).and_then(|view| view.with_k(k)).unwrap()
+        };
+        assert_about(frames(&full, all(5.0, 11.0)), 10.0);
+        assert_about(frames(&full, all(1.0, 22.0)), 12.0);
+        assert_about(frames(&full, all(1.0, 11.0)), libm::atan2(0.6, 0.8) / 0.1);
+        // With a heading: so far forward, and so far astray.
+        let ahead = Course { heading: DVec3::X, rho: 2.0, stray: 0.25, ..full };
+        assert_about(frames(&ahead, to(6.0, 0.0, 0.0)), 3.0);
+        assert_about(frames(&ahead, to(6.0, 0.3, 0.4)), 3.0);
+        assert_about(frames(&ahead, to(6.0, 0.6, 0.8)), 4.0);
+        assert_about(frames(&ahead, to(0.0, 3.0, 0.0)), 12.0);
+        // Back is astray, all of it.
+        assert_about(frames(&ahead, to(-3.0, 4.0, 0.0)), 20.0);
+        assert_about(frames(&Course { rho: 0.0, ..ahead }, to(1.0, 0.0, 0.0)), 4.0);
+    }
+
+    /// Of several views the one that has moved most counts, whichever it is.
+    #[test]
+    fn of_several_views_the_fastest_counts() {
+        let turned = |view: View, x: f64| view.with_direction(DVec3::new(x, 0.0, 1.0).normalize()).unwrap();
+        let full = Course::from(FULL);
+        let before = [view(0.0), view(5.0), view(9.0)];
+        let after = [turned(view(0.0), 0.1), view(7.0).with_k(11.5).unwrap(), turned(view(9.5), 0.2)];
+        for order in [[0, 1, 2], [1, 2, 0], [2, 0, 1]] {
+            let (before, after) = (order.map(|at| before[at]), order.map(|at| after[at]));
+            let travel = Travel::between(&before, &after).unwrap();
+            assert_about(travel.turned, libm::atan2(0.2, 1.0));
+            assert_about(travel.steered, 1.5);
+            let moves: Vec<f64> = travel.moves().map(|moved| moved.x).collect();
+            assert_eq!(moves, order.map(|at| [0.0, 2.0, 0.5][at]));
+            assert_eq!(Odometer::default().advance(&full, &before, &before), Motion::Rest);
+            let mut clock = Odometer::default();
+            let Motion::Frames(frames) = clock.advance(&full, &before, &after) else { panic!("no frames") };
+            assert_about(frames, 4.0);
+        }
+    }
+
+    /// Time passes while there is motion, and its sum is that of the parts; to foresee it is not to let it pass.
+    #[test]
+    fn the_clock_counts_what_has_been_travelled() {
+        let course = Course::from(FULL);
+        let mut clock = Odometer::default();
+        for (step, x) in [(0, 1.0), (1, 1.5), (2, 1.5), (3, 0.0)] {
+            let before = [view([0.0, 1.0, 1.5, 1.5][step])];
+            let after = [view(x)];
+            let travel = Travel::between(&before, &after).unwrap();
+            let then = clock.after(&course, &travel);
+            let motion = clock.advance(&course, &before, &after);
+            assert_eq!(clock.now(), then);
+            assert_about(clock.now(), [2.0, 3.0, 3.0, 6.0][step]);
+            assert_eq!(motion == Motion::Rest, step == 2);
+        }
+        // What no speed covers has no end, and does not move the clock.
+        let before = clock.now();
+        let far = [view(0.0), view(1e9)].map(|view| [view]);
+        let travel = Travel::between(&far[0], &far[1]).unwrap();
+        assert_eq!(clock.after(&course, &travel), f64::INFINITY);
+        assert_eq!(clock.advance(&course, &far[0], &far[1]), Motion::Unbounded);
+        assert_eq!(clock.now(), before);
+        // However small a step is, the clock moves.
+        let small = [view(0.0), view(5e-324)].map(|view| [view]);
+        for _ in 0..3 {
+            let before = clock.now();
+            assert!(matches!(clock.advance(&course, &small[0], &small[1]), Motion::Frames(_)));
+            assert!(clock.now() > before);
+        }
+    }
+
+    #[test]
+    fn other_views_can_not_be_compared() {
+        let wide = view(0.0).with_cone(0.6, 0.8).unwrap();
+        let course = Course::from(FULL);
+        let motion = |before: &[View], after: &[View]| Odometer::default().advance(&course, before, after);
+        assert_eq!(motion(&[view(0.0)], &[wide]), Motion::Unbounded);
+        assert_eq!(motion(&[view(0.0)], &[view(0.0), view(0.0)]), Motion::Unbounded);
+        assert_eq!(motion(&[view(0.0), wide], &[view(0.0), view(0.0)]), Motion::Unbounded);
+        assert_eq!(motion(&[], &[view(0.0)]), Motion::Unbounded);
+        assert_eq!(motion(&[], &[]), Motion::Rest);
+        assert_eq!(motion(&[view(0.0), wide], &[view(0.0), wide]), Motion::Rest);
+        // A billion frames and more are no motion that anybody has declared.
+        assert!(matches!(motion(&[view(0.0)], &[view(4.9e8)]), Motion::Frames(_)));
+        assert_eq!(motion(&[view(0.0)], &[view(5.1e8)]), Motion::Unbounded);
+    }
+
+    #[test]
+    fn frames_to_a_mark() {
+        let course = Course::from(FULL);
+        assert_eq!(course.frames(3.0, 0.5), 6.0);
+        assert_eq!((course.frames(0.0, 0.5), course.frames(-1.0, 0.5)), (0.0, 0.0));
+        assert_eq!(course.frames(1.0, 0.0), f64::INFINITY);
+        assert_eq!(later(1.0, 2.0), 2.0);
+        assert_eq!(later(2.0, 1.0), 2.0);
+        assert!(later(1.0, f64::NAN).is_nan() && later(f64::NAN, 1.0).is_nan());
+    }
 }

@@ -151,27 +151,40 @@ impl EventQueue {
     /// Cancels whatever is scheduled for a node of which nothing is likely to be: its event has come up.
     #[inline]
     pub fn retire(&mut self, slot: Slot) {
-        let Some(ticket) = self.tickets.get_mut(slot.index()) else { return };
-        *ticket = ticket.wrapping_add(1);
-        if *ticket == 0 {
-            self.sweep_all();
+        if slot.index() < self.tickets.len() && self.is_last_ticket(slot) {
+            self.begin_anew(slot);
         }
     }
 
     /// Cancels whatever is scheduled for a node.
     #[inline]
     pub fn cancel(&mut self, slot: Slot) {
-        let Some(ticket) = self.tickets.get_mut(slot.index()) else { return };
-        *ticket = ticket.wrapping_add(1);
-        let wrapped = *ticket == 0;
+        if slot.index() >= self.tickets.len() {
+            return;
+        }
         self.cancelled += 1;
-        // A ticket that has come round could bring an old event back to life: sweep before it can. Otherwise sweep
-        // while half of what is stored may be garbage, bucket by bucket, so that no frame pays for all of it.
-        if wrapped {
-            self.sweep_all();
+        // While half of what is stored may be garbage, it is swept bucket by bucket, so that no frame pays for all of it.
+        if self.is_last_ticket(slot) {
+            self.begin_anew(slot);
         } else if self.cancelled > self.stored / 2 + 1024 {
             self.sweep_on();
         }
+    }
+
+    /// Gives a node the next ticket. Whether that is the last.
+    #[inline(always)]
+    fn is_last_ticket(&mut self, slot: Slot) -> bool {
+        let ticket = &mut self.tickets[slot.index()];
+        *ticket += 1;
+        *ticket == u16::MAX
+    }
+
+    /// A ticket that comes round could bring an old event back to life. No event has the last ticket, so that now a sweep drops
+    /// all those of the node, and it can begin with the first again.
+    #[cold]
+    fn begin_anew(&mut self, slot: Slot) {
+        self.sweep_all();
+        self.tickets[slot.index()] = 0;
     }
 
     /// Sweeps the next bucket that is not empty.
@@ -319,3 +332,6 @@ fn sweep(pool: &mut Pool, bucket: &mut Bucket, kept: &mut Vec<Event>, tickets: &
     kept.iter().for_each(|&event| pool.push(bucket, event));
     all - kept.len()
 }
+
+#[cfg(test)]
+mod tests;

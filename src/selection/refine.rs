@@ -129,3 +129,6 @@ impl Finder {
         }
     }
 }
+
+#[cfg(test)]
+mod tests;

@@ -72,25 +72,27 @@ impl SlotTable {
 mod tests {
     use std::collections::BTreeMap;
 
+    use rand::{RngExt, SeedableRng};
+    use rand_pcg::Pcg64;
+
     use super::*;
 
     #[test]
     fn agrees_with_an_ordered_map() {
         let limit = 1000;
         let (mut table, mut model) = (SlotTable::new(limit), BTreeMap::new());
-        let mut state = 1_u64;
+        let mut random = Pcg64::seed_from_u64(1);
         for step in 1..20_000_u32 {
-            state = state.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
             // Now here, now there, so that pieces come and go.
             let around = 300 * (step / 1000 % 3);
-            let node = NodeId(around + ((state >> 33) % 300) as u32);
+            let node = NodeId(around + random.random_range(0..300));
             if model.remove(&node).is_some() {
                 table.remove(node);
-            } else if state >> 20 & 1 == 0 || model.len() < 3 {
+            } else if model.len() < 3 || random.random() {
                 table.insert(node, Slot(step));
                 model.insert(node, Slot(step));
             }
-            let probe = NodeId(((state >> 13) % u64::from(limit)) as u32);
+            let probe = NodeId(random.random_range(0..limit));
             assert_eq!(table.get(probe), model.get(&probe).copied().unwrap_or(Slot::NONE));
         }
         let pieces = |table: &SlotTable| table.pieces.iter().flatten().count();

@@ -116,3 +116,6 @@ pub fn conforms_with_mesh<T: VertexTree>(mut open: impl FnMut() -> T) -> Totals 
     assert_eq!(engine.sink().shape(), base.shape(), "wholly folded it is not the base mesh");
     totals
 }
+
+#[cfg(test)]
+mod tests;

@@ -1,12 +1,12 @@
 //! A backend that does as it should passes; one that lies is found, however it lies.
 
-use vertex_tree::{Bounds, Hierarchy, MeshSink, NodeId, Step, TreeError, VertexTree};
+use vertex_tree::{Bounds, Hierarchy, MeshSink, NodeId, NormalCone, Step, TreeError, VertexTree};
 
 use crate::{conforms, conforms_with_mesh};
 
 /// What is wrong with a backend.
 #[derive(Clone, Copy, Debug, PartialEq)]
-enum Lie {
+pub(crate) enum Lie {
     Nothing,
     /// It counts one triangle too many once enough is shown.
     Displayed,
@@ -22,7 +22,7 @@ enum Lie {
 
 /// A strip of triangles along a line, halved over and over: node `n` has the children `2 n + 1` and `2 n + 2`, and shows one triangle
 /// while it is folded.
-struct Strip {
+pub(crate) struct Strip {
     lie: Lie,
     roots: Vec<NodeId>,
     displayed: u64,
@@ -31,7 +31,7 @@ struct Strip {
 const NODES: u32 = (1 << 10) - 1;
 
 impl Strip {
-    fn new(lie: Lie) -> Self {
+    pub(crate) fn new(lie: Lie) -> Self {
         Self { lie, roots: if lie == Lie::Empty { vec![] } else { vec![NodeId(0)] }, displayed: 1 }
     }
 
@@ -61,6 +61,7 @@ impl Strip {
 
 impl Hierarchy for Strip {
     const IS_TREE: bool = true;
+    const HAS_CONES: bool = true;
 
     fn node_limit(&self) -> u32 {
         NODES
@@ -79,6 +80,11 @@ impl Hierarchy for Strip {
         let level = (node + 1).ilog2();
         let radius = if self.lie == Lie::Bounds && node == 77 { 9.0 } else { 0.75 * (b - a) + 1.0 };
         Bounds { center: [(a + b) / 2.0, 0.0, 0.0], radius, eps: 1.0 / (1 << level) as f32 }
+    }
+
+    /// All triangles face the same way; the fewer there are, the more the cone says so.
+    fn normal_cone(&self, NodeId(node): NodeId) -> NormalCone {
+        NormalCone { axis: [0.0, 0.0, 1.0], sine: 0.8 - 0.07 * (node + 1).ilog2() as f32 }
     }
 
     fn children(&self, NodeId(node): NodeId) -> impl Iterator<Item = NodeId> {

@@ -52,7 +52,9 @@ impl Walk {
     }
 }
 
-fn direction(random: &mut impl Rng) -> DVec3 {
+/// Any direction, each as likely as the others.
+#[must_use]
+pub fn direction(random: &mut impl Rng) -> DVec3 {
     loop {
         let v = DVec3::from([0; 3].map(|_| random.random_range(-1.0..1.0)));
         if (0.01..1.0).contains(&v.length_squared()) {
@@ -61,8 +63,9 @@ fn direction(random: &mut impl Rng) -> DVec3 {
     }
 }
 
-/// A view from somewhere around a sphere or within it, roughly towards its middle.
-fn anywhere(center: DVec3, radius: f64, random: &mut impl Rng) -> View {
+/// A view from somewhere around a sphere or within it, roughly towards its middle. The tolerance is a thousandth of the distance.
+#[must_use]
+pub fn anywhere(center: DVec3, radius: f64, random: &mut impl Rng) -> View {
     let eye = center + direction(random) * radius * random.random_range(0.3..4.0);
     let ahead = center + direction(random) * 0.7 * radius - eye;
     // Half the angle of the cone that holds the pyramid of view: its tangent is 1.
@@ -70,10 +73,13 @@ fn anywhere(center: DVec3, radius: f64, random: &mut impl Rng) -> View {
     View::from_parts(eye, ahead.normalize(), half, half, 1000.0).expect("a view")
 }
 
-fn step(view: View, center: DVec3, radius: f64, random: &mut impl Rng) -> View {
+/// One frame of a walk around a sphere: mostly slow, sometimes at rest, fast, turning, or elsewhere altogether, with the same
+/// tolerance.
+#[must_use]
+pub fn step(view: View, center: DVec3, radius: f64, random: &mut impl Rng) -> View {
     let moved = |view: View, by: DVec3| view.with_eye(view.eye() + by).expect("an eye");
     match random.random_range(0..40) {
-        0 => anywhere(center, radius, random),
+        0 => anywhere(center, radius, random).with_k(view.k()).expect("a tolerance"),
         1..=5 => view,
         6..=8 => turned(view, 0.4 * random.random::<f64>(), random),
         9..=10 => moved(view, direction(random) * 0.5 * radius * random.random::<f64>()),
@@ -90,7 +96,8 @@ fn step(view: View, center: DVec3, radius: f64, random: &mut impl Rng) -> View {
 
 /// A view turned by so many radians about a random axis.
 #[expect(clippy::disallowed_methods, reason = "a random motion: it need not be the same on every platform")]
-fn turned(view: View, angle: f64, random: &mut impl Rng) -> View {
+#[must_use]
+pub fn turned(view: View, angle: f64, random: &mut impl Rng) -> View {
     let axis = view.direction().any_orthogonal_vector().normalize();
     let axis = DQuat::from_axis_angle(view.direction(), random.random_range(0.0..6.0)) * axis;
     let direction = DQuat::from_axis_angle(axis, angle) * view.direction();

@@ -4,7 +4,7 @@
 use std::path::Path as FilePath;
 use std::sync::OnceLock;
 
-use crate::common::{Random, data, meshes, trajectories};
+use crate::common::{data, meshes, seeded, trajectories};
 use crate::walks::{Length, follow, pixels};
 use foldfront::experiment::path::import::{Mode, Options, import_text};
 use foldfront::experiment::path::recorded;
@@ -38,7 +38,7 @@ fn laserscan() {
 /// A scan with holes, handles and shards, its hierarchy built once for all tests.
 fn scan() -> &'static CollapseLog {
     static SCAN: OnceLock<CollapseLog> = OnceLock::new();
-    SCAN.get_or_init(|| data::log(meshes::scan(12, &mut Random(1))))
+    SCAN.get_or_init(|| data::log(meshes::scan(12, &mut seeded(1))))
 }
 
 #[test]
@@ -99,12 +99,12 @@ fn a_car_through_a_town() {
 
 #[test]
 fn a_hand_held_camera_around_a_patchwork() {
-    let mesh = meshes::patchwork(10, &mut Random(2));
+    let mesh = meshes::patchwork(10, &mut seeded(2));
     imported(&trajectories::hand_held(10), mesh, Mode::Orbit, 60.0, pixels(3.0));
 }
 
 #[test]
 fn a_flight_over_mountains_with_voids() {
-    let mesh = meshes::ground(100, 8, &mut Random(3));
+    let mesh = meshes::ground(100, 8, &mut seeded(3));
     imported(&trajectories::flight(12), mesh, Mode::Fly, 30.0, pixels(4.0));
 }

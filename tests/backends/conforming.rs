@@ -16,10 +16,10 @@ use mt_partition::MtTree;
 
 use crate::common::backends::meta_node_file;
 use crate::common::quadtree::PointTree;
-use crate::common::{Random, data, detail_block, graph_cut, meshes};
+use crate::common::{data, detail_block, graph_cut, meshes, seeded};
 
 fn scan() -> CollapseLog {
-    data::log(meshes::scan(6, &mut Random(1)))
+    data::log(meshes::scan(6, &mut seeded(1)))
 }
 
 fn is_worth_something(totals: Totals) {
@@ -73,7 +73,7 @@ fn a_backend_chosen_at_run_time() {
 /// What `compare` says of a tree of whoever's is what it says of the same tree as one of its own.
 #[test]
 fn trees_of_others_are_compared_as_our_own() {
-    let log = data::log(meshes::scan(8, &mut Random(5)));
+    let log = data::log(meshes::scan(8, &mut seeded(5)));
     let mut subject = Subject::new("scan", &log).unwrap();
     let path = around(&log.mesh).unwrap();
     let options = Options { strategies: Strategy::ALL.to_vec(), check: true, ..Options::default() };

@@ -4,7 +4,7 @@ use std::time::Duration;
 
 use crate::common::backends::meta_node_file;
 use crate::common::detail_block as detail;
-use crate::common::{Random, bumpy_grid, graph_cut};
+use crate::common::{bumpy_grid, graph_cut, seeded};
 use detail_block::{Arrangement, XfmTree};
 use foldfront::CollapseLog;
 use foldfront::construction::simplify;
@@ -27,7 +27,7 @@ const STORE: Simulated = Simulated { latency: Duration::from_millis(50), bandwid
 const FLIGHT: u32 = 60;
 
 fn log() -> CollapseLog {
-    let mesh = bumpy_grid(120, &mut Random(7));
+    let mesh = bumpy_grid(120, &mut seeded(7));
     simplify::build(mesh, &simplify::Options::default(), &mut |_, _| ()).unwrap().0
 }
 

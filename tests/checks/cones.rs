@@ -11,7 +11,7 @@ use foldfront::testing::brute_force::BruteForce;
 use foldfront::vertex_tree::MeshSink;
 
 use crate::common::detail_block::{OwnCut, file, options, reading};
-use crate::common::{Random, random_step, random_view};
+use crate::common::{random_step, random_view, seeded};
 use crate::flights::{assert_closed, placed, settings};
 
 fn engine<M: MeshSink>(
@@ -43,7 +43,7 @@ pub fn what_is_seen_from_behind_stays_coarse(log: &CollapseLog, k: f64, spared: 
             BruteForce::new(&mut XfmTree::new(file.clone(), reading(Io::Blocking)).unwrap()).unwrap();
         let strategies = [Strategy::TopDown, Strategy::Front, Strategy::Event];
         let mut engines = strategies.map(|strategy| engine(&file, ActiveMesh::new(), log, strategy));
-        let mut random = Random(21);
+        let mut random = seeded(21);
         let mut view = random_view(&mut random).with_k(k).unwrap();
         let (mut with, mut without, mut event_tests, mut front_tests) = (0, 0, 0, 0);
         for frame in 0..240 {

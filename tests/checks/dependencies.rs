@@ -9,7 +9,7 @@ use foldfront::vertex_tree::{Hierarchy, NONE, NullSink};
 use meta_node::{BuildOptions, Dependencies, MetaNodeTree};
 
 use crate::common::backends::meta_node_file;
-use crate::common::{Random, random_step, random_view};
+use crate::common::{random_step, random_view, seeded};
 
 pub const EXACT: [Strategy; 3] = [Strategy::TopDown, Strategy::Front, Strategy::Event];
 /// Small pages, so that small meshes have many.
@@ -120,7 +120,7 @@ pub fn force_block_and_off(log: &CollapseLog) {
             })
             .into();
         let mut oracle = Oracle::new(log).unwrap();
-        let mut random = Random(12);
+        let mut random = seeded(12);
         let mut view = random_view(&mut random);
         let (mut flips, mut forced, mut blocked, mut differ) = (0, 0, 0, 0);
         for frame in 0..400 {

@@ -18,7 +18,7 @@ use foldfront::{CollapseLog, Mesh};
 use glam::DVec3;
 
 use crate::common::detail_block::{OwnCut, advance_settled, file, options, reading};
-use crate::common::{Random, random_step, random_view};
+use crate::common::{random_step, random_view, seeded};
 
 /// A view of a walk around the origin, brought to a mesh.
 pub fn placed(mesh: &Mesh, view: View) -> View {
@@ -107,7 +107,7 @@ pub fn forced_cuts_are_the_closure(log: &CollapseLog, frames: usize) {
         let tree = XfmTree::new(file.clone(), reading(Io::Blocking)).unwrap();
         Engine::new(tree, ActiveMesh::new(), settings(&log.mesh, strategy)).unwrap()
     });
-    let mut random = Random(8);
+    let mut random = seeded(8);
     let mut view = random_view(&mut random).with_k(300.0).unwrap();
     let (mut forced, mut changes) = (0, 0);
     let mut stack = Vec::new();
@@ -155,7 +155,7 @@ pub fn a_bad_store_delays_and_no_more(log: &CollapseLog) {
         tree.set_quotas(all / 20, u64::MAX);
         let settings = settings(&log.mesh, Strategy::Event);
         let mut engine = Engine::new(tree, ActiveMesh::new(), settings).unwrap();
-        let mut random = Random(seed);
+        let mut random = seeded(seed);
         let mut view = random_view(&mut random).with_k(300.0).unwrap();
         let delay = Duration::from_micros(100);
         let mut faults = 0;

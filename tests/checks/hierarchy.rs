@@ -10,8 +10,9 @@ use foldfront::testing::cut::{Displayed, uniform_cut};
 use foldfront::{CollapseLog, Mesh};
 use glam::DVec3;
 
-use crate::common::Random;
+use crate::common::{direction, seeded};
 use crate::replay::Replay;
+use rand::RngExt;
 
 pub fn options(merge_components: bool) -> Options {
     let mut options = Options::default();
@@ -41,15 +42,15 @@ pub fn check(mesh: &Mesh, log: &CollapseLog, report: &Report) {
     }
 
     // Cuts for cameras near and far, and for a tolerance that is the same everywhere.
-    let mut random = Random(report.collapses as u64);
+    let mut random = seeded(report.collapses as u64);
     let (low, high) = mesh.bounding_box().unwrap_or_default();
     let [low, high] = [low, high].map(|corner| DVec3::from(corner.map(f64::from)));
     for _ in 0..4 {
         // A mesh may be a single point, which nothing can look at from there.
         let extent = if mesh.extent() > 0.0 { mesh.extent() } else { 1.0 };
-        let distance = extent * 10_f64.powf(2.0 * random.unit() - 1.5);
-        let eye = (low + high) * 0.5 + random.direction() * distance;
-        let target = low + (high - low) * DVec3::new(random.unit(), random.unit(), random.unit());
+        let distance = extent * 10_f64.powf(random.random_range(-1.5..0.5));
+        let eye = (low + high) * 0.5 + direction(&mut random) * distance;
+        let target = low + (high - low) * DVec3::from(random.random::<[f64; 3]>());
         let camera = Camera::look_at(eye, target, DVec3::Y, 1.0, 16.0 / 9.0).unwrap();
         let view = [View::new(&camera, theta_of_pixels(1.0, 1080)).unwrap()];
         for criterion in [Criterion::ScreenError, Criterion::SphereSize] {

@@ -4,8 +4,10 @@
 use foldfront::selection::engine::{Engine, Settings};
 use foldfront::vertex_tree::VertexTree;
 
-use crate::common::{Random, random_step, random_view};
+use crate::common::{random_step, random_view, seeded};
 use foldfront::testing::strict_mesh::StrictMesh;
+use rand::RngExt;
+use rand_pcg::Pcg64;
 
 pub fn word(bytes: &[u8], at: usize) -> u32 {
     u32::from_le_bytes(bytes[at..at + 4].try_into().unwrap())
@@ -24,19 +26,19 @@ pub fn section(bytes: &[u8], table: usize, kind: &[u8; 4]) -> (usize, usize) {
 
 /// Changes some words of some pages, given by start and length, and makes their checksums right again: CRC-32 of all but
 /// the first word, which it is in. Half of the lies are true elsewhere.
-pub fn tell_lies(bytes: &mut [u8], pages: &[(usize, usize)], random: &mut Random) {
-    for _ in 0..1 + random.below(4) {
-        let (start, length) = pages[random.below(pages.len())];
-        let at = start + 4 * (1 + random.below(length / 4 - 1));
-        let other = pages[random.below(pages.len())];
-        let elsewhere = word(bytes, other.0 + 4 * random.below(other.1 / 4));
-        let value = match random.below(12) {
+pub fn tell_lies(bytes: &mut [u8], pages: &[(usize, usize)], random: &mut Pcg64) {
+    for _ in 0..random.random_range(1..5) {
+        let (start, length) = pages[random.random_range(0..pages.len())];
+        let at = start + 4 * (1 + random.random_range(0..length / 4 - 1));
+        let other = pages[random.random_range(0..pages.len())];
+        let elsewhere = word(bytes, other.0 + 4 * random.random_range(0..other.1 / 4));
+        let value = match random.random_range(0..12) {
             0 => 0,
             1 => u32::MAX,
-            2 => word(bytes, at) ^ 1 << random.below(32),
+            2 => word(bytes, at) ^ 1 << random.random_range(0..32),
             3 => word(bytes, at).wrapping_add(1),
             4 => word(bytes, at).wrapping_sub(1),
-            5 => random.below(pages.len()) as u32,
+            5 => random.random_range(0..pages.len()) as u32,
             _ => elsewhere,
         };
         put(bytes, at, value);
@@ -56,7 +58,7 @@ pub struct Outcome {
 
 /// Follows a walk. No more than so many triangles can be displayed at a time, or be left behind.
 pub fn follow<T: VertexTree>(tree: T, seed: u64, most: usize) -> Outcome {
-    let mut random = Random(seed);
+    let mut random = seeded(seed);
     let settings = Settings { rho: 0.02, ..Settings::default() };
     let mut engine = Engine::new(tree, StrictMesh::default(), settings).unwrap();
     let mut view = random_view(&mut random).with_k([3.0, 30.0, 300.0][seed as usize % 3]).unwrap();

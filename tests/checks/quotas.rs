@@ -13,7 +13,7 @@ use foldfront::vertex_tree::{Hierarchy, NullSink, Prefetch};
 
 use crate::common::backends::combinations;
 use crate::common::detail_block::{OwnCut, file, options, reading};
-use crate::common::{Random, random_step, random_view};
+use crate::common::{random_step, random_view, seeded};
 use crate::flights::{placed, settings};
 
 /// So many frames, slow and fast, rests and teleports, while an I/O thread brings what it can: the blocks in memory and
@@ -23,7 +23,7 @@ pub fn the_hard_quota_holds(log: &CollapseLog, frames: usize) {
     let all = file.resident_bytes_of_all();
     let tree = XfmTree::new(file, reading(Io::Background)).unwrap();
     let mut engine = Engine::new(tree, NullSink, settings(&log.mesh, Strategy::Event)).unwrap();
-    let mut random = Random(1);
+    let mut random = seeded(1);
     let mut view = random_view(&mut random).with_k(300.0).unwrap();
     let (mut misses, mut limited, mut hard) = (0, 0, 0);
     for frame in 0..frames {

@@ -10,7 +10,7 @@ use foldfront::{CollapseLog, Mesh};
 use glam::DVec3;
 use in_memory::{InMemoryHierarchy, InMemoryTree};
 
-use crate::common::{Random, data, random_step, random_view};
+use crate::common::{data, random_step, random_view, seeded};
 
 /// For each input triangle the input vertices at which its corners are shown, [`NONE`] where it is hidden.
 pub type Shown = Vec<[u32; 3]>;
@@ -97,7 +97,7 @@ fn a_walk_shows_what_the_log_says(name: &str, log: &CollapseLog, hierarchy: &Arc
     let tree = InMemoryTree::new(hierarchy.clone());
     let mesh = ActiveMesh::new();
     let mut engine = Engine::new(tree, mesh, Settings { rho: 0.02 * scale, ..Settings::default() }).unwrap();
-    let mut random = Random(11);
+    let mut random = seeded(11);
     let mut view = random_view(&mut random).with_k(500.0).unwrap();
     let (mut most, mut changes) = (0, 0);
     for frame in 0..200 {

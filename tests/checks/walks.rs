@@ -10,11 +10,12 @@ use foldfront::selection::budget::Budget;
 use foldfront::selection::criterion::Criterion;
 use foldfront::selection::engine::Settings;
 use foldfront::selection::view::{Camera, View, theta_of_pixels};
+use foldfront::testing::walk::turned;
 use foldfront::{CollapseLog, Mesh};
 use glam::{DQuat, DVec3};
 
 use crate::common::backends::Conformance;
-use crate::common::{Random, random_step, random_view, turn};
+use crate::common::{random_step, random_view, seeded};
 
 /// So many pixels on an image of 1080 lines.
 pub fn pixels(number: f64) -> f64 {
@@ -74,7 +75,7 @@ pub fn random(log: &CollapseLog, criterion: Criterion, k: f64, seed: u64, length
     let placed = Placed::around(&log.mesh);
     let settings = Settings { criterion, rho: 0.02 * placed.scale, omega: 0.02, ..Settings::default() };
     let mut table = Conformance::new(log, settings);
-    let mut random = Random(seed);
+    let mut random = seeded(seed);
     let mut view = random_view(&mut random).with_k(k).unwrap();
     for frame in 0..length.frames {
         if frame == length.with_all {
@@ -91,7 +92,7 @@ pub fn random(log: &CollapseLog, criterion: Criterion, k: f64, seed: u64, length
 pub fn a_slow_pan(log: &CollapseLog, length: Length) {
     let placed = Placed::around(&log.mesh);
     let mut table = Conformance::new(log, Settings { rho: 0.02 * placed.scale, ..Settings::default() });
-    let mut random = Random(3);
+    let mut random = seeded(3);
     // From within, so that the mesh is on all sides.
     let eye = DVec3::new(0.1, -0.2, 0.1);
     let mut view = random_view(&mut random).with_k(200.0).unwrap().with_eye(eye).unwrap();
@@ -170,12 +171,12 @@ pub fn a_budget_in_time(log: &CollapseLog, frames: usize, changes: u64) {
 pub fn several_views(log: &CollapseLog, frames: usize, changes: u64) {
     let placed = Placed::around(&log.mesh);
     let mut table = Conformance::new(log, Settings { rho: 0.02 * placed.scale, ..Settings::default() });
-    let mut random = Random(4);
+    let mut random = seeded(4);
     let mut left = random_view(&mut random).with_k(300.0).unwrap();
     let mut shadow = random_view(&mut random).with_k(50.0).unwrap();
     for frame in 0..frames {
         random_step(&mut left, &mut random);
-        turn(&mut shadow, 0.001, &mut random);
+        shadow = turned(shadow, 0.001, &mut random);
         let right = left.with_eye(left.eye() + 0.01 * left.direction().any_orthonormal_vector()).unwrap();
         let views = [left, right, shadow].map(|view| placed.view(view));
         table.advance(&views[..[3, 2, 1, 0, 3][frame / 40 % 5]]);

@@ -6,8 +6,10 @@ use std::collections::HashMap;
 use foldfront::Mesh;
 use foldfront::experiment::scene::{Scene, SceneKind};
 use glam::DVec3;
+use rand::RngExt;
+use rand_pcg::Pcg64;
 
-use super::Random;
+use super::direction;
 
 /// Noise that is smooth between the corners of a lattice of spacing 1: in -1..1, of mean 0.
 fn noise(p: DVec3, seed: u64) -> f64 {
@@ -17,7 +19,9 @@ fn noise(p: DVec3, seed: u64) -> f64 {
         let mixed = [at.x, at.y, at.z].iter().fold(seed, |hash, &x| {
             (hash ^ x as i64 as u64).wrapping_mul(0x9e37_79b9_7f4a_7c15).rotate_left(29)
         });
-        Random(mixed).unit() * 2.0 - 1.0
+        // A hash, not a generator: what it gives is in the bits of every shape (`made_up.rs`).
+        let mixed = mixed.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
+        (mixed >> 11) as f64 / (1_u64 << 52) as f64 - 1.0
     };
     let t = p - cell;
     let t = t * t * (3.0 - 2.0 * t);
@@ -161,23 +165,24 @@ fn normals(mesh: &Mesh) -> Vec<DVec3> {
 /// A scan as it comes from merging range images: a surface with handles, holes where nothing was seen, noise, vertices in
 /// one place (and so triangles without area), and shards beside it. Every edge has two triangles or one, and around every
 /// vertex they are one fan.
-pub fn scan(side: usize, random: &mut Random) -> Mesh {
+pub fn scan(side: usize, random: &mut Pcg64) -> Mesh {
     let mut mesh = with_handles(2, side);
     let edge = 1.0 / side as f64;
     for position in &mut mesh.positions {
-        *position = (of(*position) + random.direction() * 0.2 * edge * random.unit()).as_vec3().to_array();
+        *position =
+            (of(*position) + direction(random) * 0.2 * edge * random.random::<f64>()).as_vec3().to_array();
     }
     // In one place with a neighbour.
     for _ in 0..mesh.triangles.len() / 500 {
-        let [a, b, _] = mesh.triangles[random.below(mesh.triangles.len())];
+        let [a, b, _] = mesh.triangles[random.random_range(0..mesh.triangles.len())];
         mesh.positions[a as usize] = mesh.positions[b as usize];
     }
     pierce(&mut mesh, 12, 3.0 * edge, random);
     for _ in 0..20 {
         let [a, b, c] =
-            mesh.triangles[random.below(mesh.triangles.len())].map(|v| mesh.positions[v as usize]);
+            mesh.triangles[random.random_range(0..mesh.triangles.len())].map(|v| mesh.positions[v as usize]);
         let first = mesh.positions.len() as u32;
-        let aside = random.direction() * 2.0 * edge;
+        let aside = direction(random) * 2.0 * edge;
         let far = of(a) + of(b) - of(c);
         mesh.positions.extend([of(a), of(b), of(c), far].map(|p| (p + aside).as_vec3().to_array()));
         mesh.triangles.extend([[0, 1, 2], [1, 0, 3]].map(|t| t.map(|v| first + v)));
@@ -186,10 +191,10 @@ pub fn scan(side: usize, random: &mut Random) -> Mesh {
 }
 
 /// Takes away what is within up to `radius` of so many places, and then whatever hangs together at a vertex alone.
-fn pierce(mesh: &mut Mesh, holes: usize, radius: f64, random: &mut Random) {
+fn pierce(mesh: &mut Mesh, holes: usize, radius: f64, random: &mut Pcg64) {
     for _ in 0..holes {
-        let center = of(mesh.positions[random.below(mesh.positions.len())]);
-        let radius = radius * random.unit();
+        let center = of(mesh.positions[random.random_range(0..mesh.positions.len())]);
+        let radius = radius * random.random::<f64>();
         let positions = &mesh.positions;
         mesh.triangles.retain(|t| t.iter().all(|&v| of(positions[v as usize]).distance(center) > radius));
     }
@@ -215,7 +220,7 @@ fn pierce(mesh: &mut Mesh, holes: usize, radius: f64, random: &mut Random) {
 
 /// Ground of `side * side` samples, 30 apart, with mountains that are rough at every size; `voids` is the number of places
 /// where nothing is known.
-pub fn ground(side: usize, voids: usize, random: &mut Random) -> Mesh {
+pub fn ground(side: usize, voids: usize, random: &mut Pcg64) -> Mesh {
     let mut mesh = Mesh::default();
     let at = |i: usize| i as f64 / side as f64;
     for (y, x) in (0..side * side).map(|i| (i / side, i % side)) {
@@ -252,7 +257,7 @@ pub fn part_of(kind: SceneKind, share: f32) -> Mesh {
 
 /// What an artist left: parts that touch in a vertex, fins at edges that have two triangles already, faces twice, faces
 /// turned over, and holes.
-pub fn patchwork(side: usize, random: &mut Random) -> Mesh {
+pub fn patchwork(side: usize, random: &mut Pcg64) -> Mesh {
     let mut mesh = scan(side, random);
     for part in 0..10 {
         let first = mesh.positions.len() as u32;
@@ -262,17 +267,17 @@ pub fn patchwork(side: usize, random: &mut Random) -> Mesh {
         let mut corners = |v: u32| first + v;
         mesh.triangles.extend(limb.triangles.iter().map(|t| t.map(&mut corners)));
         // One of its vertices is one of the body's.
-        let joint = random.below(first as usize) as u32;
-        let own = first + random.below(limb.positions.len()) as u32;
+        let joint = random.random_range(0..first);
+        let own = random.random_range(first..mesh.positions.len() as u32);
         mesh.triangles.iter_mut().flatten().filter(|v| **v == own).for_each(|v| *v = joint);
     }
     for _ in 0..20 {
-        let [a, b, c] = mesh.triangles[random.below(mesh.triangles.len())];
-        mesh.positions.push((of(mesh.positions[a as usize]) + random.direction() * 0.1).as_vec3().to_array());
+        let [a, b, c] = mesh.triangles[random.random_range(0..mesh.triangles.len())];
+        mesh.positions.push((of(mesh.positions[a as usize]) + direction(random) * 0.1).as_vec3().to_array());
         mesh.triangles.extend([[a, b, mesh.positions.len() as u32 - 1], [a, b, c]]);
     }
     for _ in 0..20 {
-        let turned = random.below(mesh.triangles.len());
+        let turned = random.random_range(0..mesh.triangles.len());
         mesh.triangles[turned].swap(0, 1);
     }
     compact(&mut mesh);

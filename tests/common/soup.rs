@@ -7,6 +7,9 @@
 #![expect(clippy::disallowed_methods, reason = "random shapes and motions, or figures to compare with")]
 
 use foldfront::Mesh;
+use rand::seq::IndexedRandom;
+use rand::{RngExt, SeedableRng};
+use rand_pcg::Pcg64;
 
 /// What the triangles of a soup join.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -72,49 +75,49 @@ const SIDE: f64 = 4.0;
 
 /// The soup of a seed.
 pub fn soup(seed: u64) -> Soup {
-    let random = &mut Random(seed.wrapping_mul(0xd134_2543_de82_ef95));
-    let kind = Kind::ALL[random.below(12) as usize];
-    let count = 4 + random.below(37) as u32;
+    let random = &mut Pcg64::seed_from_u64(seed);
+    let kind = *Kind::ALL.choose(random).unwrap();
+    let count = random.random_range(4..=40);
     let mut triangles = triangles(kind, count, random);
     let positions = positions(kind, count, random);
 
-    let turned = *random.pick(&TURNED);
+    let turned = *TURNED.choose(random).unwrap();
     for t in &mut triangles {
-        if random.unit() < turned {
+        if random.random_bool(turned) {
             t.swap(1, 2);
         }
     }
-    let doubled = *random.pick(&[0.0, 0.0, 0.1, 0.5]);
+    let doubled = *[0.0, 0.0, 0.1, 0.5].choose(random).unwrap();
     for i in 0..triangles.len() {
         let [a, b, c] = triangles[i];
-        if random.unit() < doubled {
-            triangles.push(*random.pick(&[[a, b, c], [b, c, a], [b, a, c]]));
+        if random.random_bool(doubled) {
+            triangles.push(*[[a, b, c], [b, c, a], [b, a, c]].choose(random).unwrap());
         }
     }
     Soup { kind, mesh: Mesh { positions, triangles, ..Mesh::default() } }
 }
 
-fn triangles(kind: Kind, count: u32, random: &mut Random) -> Vec<[u32; 3]> {
-    let any = |random: &mut Random| [(); 3].map(|()| random.below(count.into()) as u32);
+fn triangles(kind: Kind, count: u32, random: &mut Pcg64) -> Vec<[u32; 3]> {
+    let any = |random: &mut Pcg64| [(); 3].map(|()| random.random_range(0..count));
     let side = count.isqrt();
     match kind {
         Kind::Random | Kind::Coincident => (0..2 * count).map(|_| any(random)).collect(),
         Kind::Grid | Kind::Flat => squares(side, side - 1, |x, y| y * side + x),
         Kind::Torus => squares(side, side, |x, y| y % side * side + x % side),
-        Kind::Fan => fan(0, 1..count, random.below(2) == 0),
+        Kind::Fan => fan(0, 1..count, random.random()),
         Kind::Book => (2..count).map(|page| [0, 1, page]).collect(),
         Kind::Strip => (2..count).map(|v| [v - 2, v - 1, v]).collect(),
         Kind::Loop => {
-            (0..count).map(|v| [v, v + 1, v + 2 + random.below(3) as u32].map(|v| v % count)).collect()
+            (0..count).map(|v| [v, v + 1, v + 2 + random.random_range(0..3)].map(|v| v % count)).collect()
         }
         Kind::Repeated => {
             let few: Vec<_> = (0..1 + count / 8).map(|_| any(random)).collect();
-            (0..count).map(|_| *random.pick(&few)).collect()
+            (0..count).map(|_| *few.choose(random).unwrap()).collect()
         }
         Kind::Closed => {
             let (mut all, mut next) = (Vec::new(), 0);
             while next + 4 <= count {
-                let ring = (2 + random.below(5) as u32).min(count - next - 2);
+                let ring = random.random_range(2..7).min(count - next - 2);
                 let rim = next + 2..next + 2 + ring;
                 // Of a ring of two, both triangles show both sides of one.
                 all.extend(fan(next, rim.clone(), true));
@@ -125,9 +128,9 @@ fn triangles(kind: Kind, count: u32, random: &mut Random) -> Vec<[u32; 3]> {
         }
         Kind::Touching => {
             let middle = count / 2;
-            let shared = 1 + random.below(2) as u32;
+            let shared = random.random_range(1..=2);
             let mut all = fan(0, 1..middle + 1, false);
-            all.extend(fan(count - 1, middle + 1 - shared..count - 1, random.below(2) == 0));
+            all.extend(fan(count - 1, middle + 1 - shared..count - 1, random.random()));
             all
         }
     }
@@ -154,10 +157,10 @@ fn fan(hub: u32, rim: std::ops::Range<u32>, closed: bool) -> Vec<[u32; 3]> {
     all
 }
 
-fn positions(kind: Kind, count: u32, random: &mut Random) -> Vec<[f32; 3]> {
-    let (scale, offset) = (*random.pick(&SCALES), SIDE * *random.pick(&OFFSETS));
-    let (crumpled, whole, plane) = (random.below(2) == 0, random.below(2) == 0, random.below(3) == 0);
-    let thrown = |random: &mut Random| [(); 3].map(|()| random.unit() * SIDE);
+fn positions(kind: Kind, count: u32, random: &mut Pcg64) -> Vec<[f32; 3]> {
+    let (scale, offset) = (*SCALES.choose(random).unwrap(), SIDE * *OFFSETS.choose(random).unwrap());
+    let (crumpled, whole, plane) = (random.random(), random.random(), random.random_ratio(1, 3));
+    let thrown = |random: &mut Pcg64| [(); 3].map(|()| random.random_range(0.0..SIDE));
     let side = f64::from(count.isqrt());
     let turn = |v: u32, of: f64| std::f64::consts::TAU * f64::from(v) / of;
     let round = |v: u32, height: f64| {
@@ -170,9 +173,9 @@ fn positions(kind: Kind, count: u32, random: &mut Random) -> Vec<[f32; 3]> {
         let (x, y) = (f64::from(v % count.isqrt()), f64::from(v / count.isqrt()));
         let anywhere = thrown(random);
         let mut p = match kind {
-            Kind::Coincident if random.below(4) > 0 => common,
+            Kind::Coincident if random.random_ratio(3, 4) => common,
             Kind::Flat => {
-                let at = if crumpled { random.unit() } else { f64::from(v) / f64::from(count) };
+                let at = if crumpled { random.random() } else { f64::from(v) / f64::from(count) };
                 std::array::from_fn(|axis| line[0][axis] + at * (line[1][axis] - line[0][axis]))
             }
             _ if crumpled => anywhere,
@@ -196,29 +199,4 @@ fn positions(kind: Kind, count: u32, random: &mut Random) -> Vec<[f32; 3]> {
         all.push(p.map(|c| ((c + offset) * scale) as f32));
     }
     all
-}
-
-/// SplitMix64 (Steele, Lea & Flood 2014).
-struct Random(u64);
-
-impl Random {
-    fn next(&mut self) -> u64 {
-        self.0 = self.0.wrapping_add(0x9e37_79b9_7f4a_7c15);
-        let z = (self.0 ^ (self.0 >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
-        let z = (z ^ (z >> 27)).wrapping_mul(0x94d0_49bb_1331_11eb);
-        z ^ (z >> 31)
-    }
-
-    fn below(&mut self, limit: u64) -> u64 {
-        self.next() % limit
-    }
-
-    /// In 0..1.
-    fn unit(&mut self) -> f64 {
-        (self.next() >> 11) as f64 / (1_u64 << 53) as f64
-    }
-
-    fn pick<'a, T>(&mut self, from: &'a [T]) -> &'a T {
-        &from[self.below(from.len() as u64) as usize]
-    }
 }

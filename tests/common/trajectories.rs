@@ -2,9 +2,10 @@
 
 use std::fmt::Write;
 
+use super::{direction, seeded};
 use glam::{DMat3, DQuat, DVec3};
-
-use super::Random;
+use rand::RngExt;
+use rand_pcg::Pcg64;
 
 /// A smooth curve along a random walk: in -1..1, with a new point every so many seconds.
 struct Wander {
@@ -13,9 +14,9 @@ struct Wander {
 }
 
 impl Wander {
-    fn new(seconds: usize, pace: f64, random: &mut Random) -> Self {
+    fn new(seconds: usize, pace: f64, random: &mut Pcg64) -> Self {
         let points = (seconds as f64 / pace) as usize + 4;
-        Self { points: (0..points).map(|_| random.direction() * random.unit()).collect(), pace }
+        Self { points: (0..points).map(|_| direction(random) * random.random::<f64>()).collect(), pace }
     }
 
     /// A uniform cubic B-spline.
@@ -36,7 +37,7 @@ struct Sample(f64, DVec3, DVec3, DVec3);
 fn samples(
     seconds: usize,
     [rate, pace]: [f64; 2],
-    random: &mut Random,
+    random: &mut Pcg64,
     at: fn(f64, DVec3, DVec3) -> [DVec3; 2],
 ) -> Vec<Sample> {
     let [place, aim] = [0; 2].map(|_| Wander::new(seconds, pace, random));
@@ -63,7 +64,7 @@ fn poses(comment: &str, samples: &[Sample], body: fn(DVec3, DVec3, DVec3) -> DMa
 
 /// Through a hall, 200 times a second, quick and with turns: x up and z forward.
 pub fn drone(seconds: usize) -> String {
-    let samples = samples(seconds, [200.0, 4.0], &mut Random(31), |_, place, aim| {
+    let samples = samples(seconds, [200.0, 4.0], &mut seeded(31), |_, place, aim| {
         [6.0 * place, aim.with_z(0.3 * aim.z)]
     });
     poses("EuRoC MAV, body (IMU) pose", &samples, |right, up, forward| DMat3::from_cols(up, right, forward))
@@ -71,7 +72,7 @@ pub fn drone(seconds: usize) -> String {
 
 /// Along streets, ten times a second, at 10 m/s, always further; z forward, and down is y in its world.
 pub fn car(seconds: usize) -> String {
-    let mut samples = samples(seconds, [10.0, 2.0], &mut Random(32), |time, place, _| {
+    let mut samples = samples(seconds, [10.0, 2.0], &mut seeded(32), |time, place, _| {
         [DVec3::new(10.0 * time, 40.0 * place.y, 0.3 * place.z), DVec3::X]
     });
     for n in 1..samples.len() {
@@ -86,7 +87,7 @@ pub fn car(seconds: usize) -> String {
 
 /// Around something, 60 times a second, with a hand that shakes: right, down and forward.
 pub fn hand_held(seconds: usize) -> String {
-    let samples = samples(seconds, [60.0, 4.0], &mut Random(33), |_, place, aim| {
+    let samples = samples(seconds, [60.0, 4.0], &mut seeded(33), |_, place, aim| {
         let eye = 2.0 * place + DVec3::new(0.0, 0.0, 1.5);
         [eye, -eye.normalize() + 0.2 * aim]
     });
@@ -99,7 +100,7 @@ fn optical(right: DVec3, up: DVec3, forward: DVec3) -> DMat3 {
 
 /// Over a terrain of width 1, in Hoppe's format: a frame a line, x forward, y left, z up.
 pub fn flight(seconds: usize) -> String {
-    let samples = samples(seconds, [30.0, 8.0], &mut Random(34), |_, place, aim| {
+    let samples = samples(seconds, [30.0, 8.0], &mut seeded(34), |_, place, aim| {
         let middle = DVec3::new(0.5, 0.25, 0.0);
         let eye = middle + DVec3::new(0.5 * place.x, 0.25 * place.y, 0.15 + 0.05 * place.z);
         [eye, (middle - eye + 0.2 * aim).with_z(-0.15)]

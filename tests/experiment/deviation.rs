@@ -3,7 +3,7 @@
 
 use std::path::Path as FilePath;
 
-use crate::common::{Random, meshes, trajectories};
+use crate::common::{meshes, seeded, trajectories};
 use foldfront::Mesh;
 use foldfront::experiment::path::around;
 use foldfront::experiment::path::import::{Mode, Options, import_text};
@@ -21,17 +21,17 @@ fn a_closed_surface_along_the_drone() {
 
 #[test]
 fn a_scan_along_the_hand_held_camera() {
-    nominal_is_measured(meshes::scan(30, &mut Random(1)), &trajectories::hand_held(20), Mode::Orbit, 3);
+    nominal_is_measured(meshes::scan(30, &mut seeded(1)), &trajectories::hand_held(20), Mode::Orbit, 3);
 }
 
 #[test]
 fn mountains_from_all_around() {
-    let mesh = meshes::ground(220, 8, &mut Random(2));
+    let mesh = meshes::ground(220, 8, &mut seeded(2));
     let path = around(&mesh).unwrap();
     crate::nominal::nominal_is_measured(mesh, &path, 3);
 }
 
 #[test]
 fn mountains_along_the_car() {
-    nominal_is_measured(meshes::ground(300, 0, &mut Random(3)), &trajectories::car(60), Mode::Walk, 2);
+    nominal_is_measured(meshes::ground(300, 0, &mut seeded(3)), &trajectories::car(60), Mode::Walk, 2);
 }

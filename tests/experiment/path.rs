@@ -160,7 +160,7 @@ mod importing {
 
     use super::*;
     use crate::arriving::comes_to_in_every_mode;
-    use crate::common::{Random, meshes, trajectories};
+    use crate::common::{meshes, seeded, trajectories};
 
     const POSES: &str = "0 0 0 1 0 0 0 1\n1 1 0 1 0 0 0 1\n2 1 1 2 0 0 0 1\n3 0 1 1 0 0 0 1\n";
 
@@ -345,9 +345,9 @@ mod importing {
             ("flight", trajectories::flight(40)),
         ];
         for mesh in [
-            meshes::scan(10, &mut Random(1)),
+            meshes::scan(10, &mut seeded(1)),
             meshes::with_handles(5, 8),
-            meshes::ground(100, 5, &mut Random(2)),
+            meshes::ground(100, 5, &mut seeded(2)),
             meshes::part_of(SceneKind::City, 0.3),
         ] {
             for (name, text) in &made_up {

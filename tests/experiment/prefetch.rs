@@ -5,7 +5,7 @@ use std::time::Duration;
 
 use crate::common::backends::meta_node_file;
 use crate::common::detail_block as detail;
-use crate::common::{Random, bumpy_grid, graph_cut};
+use crate::common::{bumpy_grid, graph_cut, seeded};
 use detail_block::Arrangement;
 use foldfront::CollapseLog;
 use foldfront::construction::simplify;
@@ -28,7 +28,7 @@ const LATENCY: Duration = Duration::from_millis(20);
 const FRAMES: usize = 150;
 
 fn log() -> CollapseLog {
-    let mesh = bumpy_grid(90, &mut Random(17));
+    let mesh = bumpy_grid(90, &mut seeded(17));
     simplify::build(mesh, &simplify::Options::default(), &mut |_, _| ()).unwrap().0
 }
 

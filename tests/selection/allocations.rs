@@ -5,12 +5,13 @@ use std::cell::Cell;
 use std::sync::Arc;
 
 use crate::common::foreseen::Foreseen;
-use crate::common::{Random, bumpy_grid, random_log, random_view, turn};
+use crate::common::{bumpy_grid, random_log, random_view, seeded};
 use foldfront::selection::active_mesh::ActiveMesh;
 use foldfront::selection::budget::WorkCap;
 use foldfront::selection::engine::{Engine, Settings};
 use foldfront::selection::refine::Strategy;
 use foldfront::selection::view::View;
+use foldfront::testing::walk::turned;
 use in_memory::{InMemoryHierarchy, InMemoryTree};
 
 thread_local! {
@@ -51,7 +52,7 @@ fn a_path_that_has_been_walked_before_allocates_nothing() {
     for (strategy, (look_ahead, work_cap)) in
         strategies.into_iter().flat_map(|strategy| ways.map(|way| (strategy, way)))
     {
-        let mut random = Random(21);
+        let mut random = seeded(22);
         let log = random_log(bumpy_grid(40, &mut random), &mut random);
         let tree = InMemoryTree::new(Arc::new(InMemoryHierarchy::new(&log).unwrap()));
         let tree = Foreseen::new(tree, look_ahead);
@@ -63,7 +64,7 @@ fn a_path_that_has_been_walked_before_allocates_nothing() {
         let mut views: Vec<View> = Vec::new();
         for _ in 0..150 {
             view = view.with_eye(view.eye() - view.eye() * 0.002).unwrap();
-            turn(&mut view, 0.004, &mut random);
+            view = turned(view, 0.004, &mut random);
             views.push(view);
         }
         views.extend_from_within(1..149);

@@ -5,7 +5,7 @@ use std::collections::{BTreeSet, VecDeque};
 use std::sync::Arc;
 use std::time::Duration;
 
-use crate::common::{Random, bumpy_grid, graph_cut, random_log, random_step, random_view, turn};
+use crate::common::{bumpy_grid, direction, graph_cut, random_log, random_step, random_view, seeded};
 use foldfront::CollapseLog;
 use foldfront::selection::active_mesh::ActiveMesh;
 use foldfront::selection::budget::WorkCap;
@@ -15,14 +15,16 @@ use foldfront::selection::refine::Strategy;
 use foldfront::selection::settled::Settled;
 use foldfront::selection::view::View;
 use foldfront::testing::oracle::Oracle;
+use foldfront::testing::walk::turned;
 use foldfront::vertex_tree::{Bounds, Hierarchy, NodeId, NullSink, Refine};
 use glam::DVec3;
 use in_memory::{InMemoryHierarchy, InMemoryTree};
 use mt_partition::MtTree;
+use rand_pcg::Pcg64;
 
 const EXACT: [Strategy; 3] = [Strategy::TopDown, Strategy::Front, Strategy::Event];
 
-fn log(side: usize, random: &mut Random) -> CollapseLog {
+fn log(side: usize, random: &mut Pcg64) -> CollapseLog {
     random_log(bumpy_grid(side, random), random)
 }
 
@@ -54,7 +56,7 @@ fn changes(report: &FrameReport) -> u64 {
 /// A cap spreads the work of a teleport over frames: most urgent first, no more than allowed, nothing lost.
 #[test]
 fn capped_work_is_carried_and_ends_at_the_cut() {
-    let mut random = Random(17);
+    let mut random = seeded(17);
     let log = log(40, &mut random);
     let mut oracle = Oracle::new(&log).unwrap();
     const CAP: u64 = 40;
@@ -65,8 +67,8 @@ fn capped_work_is_carried_and_ends_at_the_cut() {
         let mut view = random_view(&mut random);
         for frame in 0..400 {
             if frame < 30 {
-                moved(&mut view, random.direction() * 0.02);
-                turn(&mut view, 0.02, &mut random);
+                moved(&mut view, direction(&mut random) * 0.02);
+                view = turned(view, 0.02, &mut random);
             }
             let reports = engines.each_mut().map(|engine| engine.advance(&[view]).unwrap());
             if frame < 50 {
@@ -97,7 +99,7 @@ fn capped_work_is_carried_and_ends_at_the_cut() {
 
 #[test]
 fn the_most_urgent_changes_are_made_first() {
-    let mut random = Random(18);
+    let mut random = seeded(23);
     let log = log(40, &mut random);
     let view = random_view(&mut random);
     let mut engine = engine(&log, Strategy::Event, WorkCap::Changes(50));
@@ -129,7 +131,7 @@ fn boundary<'a>(tree: &'a InMemoryTree, active: &'a BTreeSet<NodeId>) -> impl It
 fn every_frame_makes_a_change() {
     for cap in [WorkCap::Time(Duration::ZERO), WorkCap::Changes(0), WorkCap::Changes(1)] {
         for strategy in Strategy::ALL {
-            let mut random = Random(19);
+            let mut random = seeded(19);
             let log = log(30, &mut random);
             let mut oracle = Oracle::new(&log).unwrap();
             let mut engine = engine(&log, strategy, cap);
@@ -139,7 +141,7 @@ fn every_frame_makes_a_change() {
                 let mut view = random_view(&mut random);
                 // On the way there is always something to do, and it is done.
                 for frame in 0..30 {
-                    moved(&mut view, random.direction() * 0.01);
+                    moved(&mut view, direction(&mut random) * 0.01);
                     let report = engine.advance(&[view]).unwrap();
                     engine.assert_well_formed();
                     assert!(
@@ -174,12 +176,12 @@ fn every_frame_makes_a_change() {
 fn folds_have_their_share() {
     for cap in [WorkCap::Changes(1), WorkCap::Changes(3), WorkCap::Changes(8), WorkCap::Time(Duration::ZERO)]
     {
-        let mut random = Random(20);
+        let mut random = seeded(20);
         let log = log(40, &mut random);
         let mut engine = engine(&log, Strategy::Event, WorkCap::None);
         let eye = DVec3::new(0.2, 0.1, 0.6);
         let view = |direction: DVec3| {
-            let mut view = random_view(&mut Random(1));
+            let mut view = random_view(&mut seeded(1));
             let by = eye - view.eye();
             moved(&mut view, by);
             view = view.with_direction(direction.normalize()).unwrap();
@@ -201,7 +203,7 @@ fn folds_have_their_share() {
 #[test]
 fn a_cap_in_time_ends_at_the_cut() {
     for strategy in EXACT {
-        let mut random = Random(21);
+        let mut random = seeded(21);
         let log = log(30, &mut random);
         let mut oracle = Oracle::new(&log).unwrap();
         let mut ample = engine(&log, strategy, WorkCap::Time(Duration::from_secs(3600)));
@@ -232,7 +234,7 @@ fn a_cap_in_time_ends_at_the_cut() {
 fn no_change_is_made_that_its_frame_does_not_ask_for() {
     for cap in [WorkCap::Changes(5), WorkCap::Time(Duration::ZERO)] {
         for strategy in EXACT {
-            let mut random = Random(22);
+            let mut random = seeded(22);
             let log = log(30, &mut random);
             let mut engine = engine(&log, strategy, cap);
             let mut view = random_view(&mut random);
@@ -261,7 +263,7 @@ fn no_change_is_made_that_its_frame_does_not_ask_for() {
 /// most eight frames ago.
 #[test]
 fn urgencies_are_at_most_eight_frames_old() {
-    let mut random = Random(23);
+    let mut random = seeded(23);
     let log = log(60, &mut random);
     let mut engine = engine(&log, Strategy::Event, WorkCap::Changes(4));
     let bounds = |engine: &Engine<InMemoryTree, ActiveMesh>, node| -> Bounds {
@@ -307,7 +309,7 @@ fn urgencies_are_at_most_eight_frames_old() {
 #[test]
 fn without_a_cap_what_was_carried_takes_its_turn() {
     for strategy in EXACT {
-        let mut random = Random(24);
+        let mut random = seeded(24);
         let log = log(30, &mut random);
         let mut oracle = Oracle::new(&log).unwrap();
         let mut engine = engine(&log, strategy, WorkCap::Changes(3));
@@ -316,12 +318,12 @@ fn without_a_cap_what_was_carried_takes_its_turn() {
             let mut view = random_view(&mut random);
             engine.set_work_cap(WorkCap::Changes(3));
             for _ in 0..10 {
-                moved(&mut view, random.direction() * 0.02);
+                moved(&mut view, direction(&mut random) * 0.02);
                 most = most.max(engine.advance(&[view]).unwrap().carried);
             }
             // In the same views, and in others.
             for by in [0.0, 0.1] {
-                moved(&mut view, random.direction() * by);
+                moved(&mut view, direction(&mut random) * by);
                 engine.set_work_cap(WorkCap::None);
                 assert_eq!(engine.advance(&[view]).unwrap().carried, 0);
                 engine.assert_well_formed();
@@ -337,7 +339,7 @@ fn without_a_cap_what_was_carried_takes_its_turn() {
 /// Nodes with several parents: a change makes others boundary nodes and collapsible, or ends that, in other ways.
 #[test]
 fn a_graph_under_a_cap() {
-    let mut random = Random(25);
+    let mut random = seeded(25);
     let options = mt_partition::BuildOptions { patch: 0.0, ..mt_partition::BuildOptions::default() };
     let file = graph_cut::file(&log(20, &mut random), &options);
     let tree = || Settled::new(MtTree::new(file.clone(), mt_partition::Settings::default()).unwrap());

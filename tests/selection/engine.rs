@@ -7,7 +7,7 @@ use std::collections::BTreeSet;
 use std::sync::Arc;
 use std::time::Duration;
 
-use crate::common::{Random, bumpy_grid, random_log, random_step, random_view, turn};
+use crate::common::{bumpy_grid, direction, random_log, random_step, random_view, seeded};
 use foldfront::CollapseLog;
 use foldfront::selection::active_mesh::ActiveMesh;
 use foldfront::selection::budget::{Budget, WorkCap};
@@ -17,6 +17,7 @@ use foldfront::selection::engine::{Engine, Settings};
 use foldfront::selection::refine::Strategy;
 use foldfront::selection::view::View;
 use foldfront::testing::oracle::Oracle;
+use foldfront::testing::walk::turned;
 use foldfront::vertex_tree::NullSink;
 use in_memory::{InMemoryHierarchy, InMemoryTree};
 
@@ -54,7 +55,7 @@ fn shown(engine: &Engine<InMemoryTree, ActiveMesh>) -> BTreeSet<(u32, [u32; 3])>
 #[test]
 fn all_strategies_agree_with_the_oracle_and_show_its_mesh() {
     for seed in 0..12 {
-        let mut random = Random(seed);
+        let mut random = seeded(seed);
         let log = random_log(bumpy_grid(18, &mut random), &mut random);
         let mut oracle = Oracle::new(&log).unwrap();
         let criterion = if seed % 3 == 0 { Criterion::SphereSize } else { Criterion::ScreenError };
@@ -104,7 +105,7 @@ fn all_strategies_agree_with_the_oracle_and_show_its_mesh() {
 #[test]
 fn a_slow_pan_flips_every_node_in_its_frame() {
     // 1e-5 radians a frame: the arc cosine of an f32 dot product would not see it.
-    let mut random = Random(7);
+    let mut random = seeded(7);
     let log = random_log(bumpy_grid(24, &mut random), &mut random);
     let mut oracle = Oracle::new(&log).unwrap();
     let tree = InMemoryTree::new(Arc::new(InMemoryHierarchy::new(&log).unwrap()));
@@ -130,7 +131,7 @@ fn a_slow_pan_flips_every_node_in_its_frame() {
 
 #[test]
 fn nothing_is_tested_at_rest() {
-    let mut random = Random(3);
+    let mut random = seeded(3);
     let log = random_log(bumpy_grid(20, &mut random), &mut random);
     let mut engine = engine(&log, Settings::default());
     let view = random_view(&mut random);
@@ -143,14 +144,14 @@ fn nothing_is_tested_at_rest() {
 #[test]
 fn a_triangle_budget_is_met_and_the_cut_stays_exact() {
     for strategy in [Strategy::TopDown, Strategy::Front, Strategy::Event] {
-        let mut random = Random(11);
+        let mut random = seeded(11);
         let log = random_log(bumpy_grid(40, &mut random), &mut random);
         let mut oracle = Oracle::new(&log).unwrap();
         let settings =
             Settings { strategy, rho: 0.02, budget: Budget::Displayed(600), ..Settings::default() };
         let mut engine = engine(&log, settings);
         // From outside of every sphere: what the eye is inside of is shown at any tolerance.
-        let eye = 5.0 * random.direction();
+        let eye = 5.0 * direction(&mut random);
         let view = random_view(&mut random).with_eye(eye).unwrap();
         let mut view = view.with_direction(-eye.normalize()).unwrap();
         for (budget, frames) in [(600, 500), (200, 500), (1500, 500)] {
@@ -159,7 +160,7 @@ fn a_triangle_budget_is_met_and_the_cut_stays_exact() {
             for frame in 0..frames {
                 // Moves gently for a while, then lets the tolerance settle.
                 if frame < frames / 2 {
-                    turn(&mut view, 0.002, &mut random);
+                    view = turned(view, 0.002, &mut random);
                 }
                 last = engine.advance(&[view]).unwrap().displayed;
                 engine.assert_well_formed();
@@ -177,7 +178,7 @@ fn a_triangle_budget_is_met_and_the_cut_stays_exact() {
 
 #[test]
 fn unfolding_everything_gives_the_input_and_folding_everything_the_base_mesh() {
-    let mut random = Random(5);
+    let mut random = seeded(5);
     let log = random_log(bumpy_grid(25, &mut random), &mut random);
     let mut engine = engine(&log, Settings::default());
     let base = shown(&engine);
@@ -198,7 +199,7 @@ fn unfolding_everything_gives_the_input_and_folding_everything_the_base_mesh() {
 
 #[test]
 fn a_renderer_that_patches_only_what_changed_has_the_same_buffers() {
-    let mut random = Random(9);
+    let mut random = seeded(9);
     let log = random_log(bumpy_grid(25, &mut random), &mut random);
     let mut engine = engine(&log, Settings { rho: 0.02, ..Settings::default() });
     let mut view = random_view(&mut random);
@@ -230,7 +231,7 @@ fn a_renderer_that_patches_only_what_changed_has_the_same_buffers() {
 /// turns, no faster than declared, they miss nothing.
 #[test]
 fn as_published_a_pan_is_followed_exactly() {
-    let mut random = Random(12);
+    let mut random = seeded(12);
     let log = random_log(bumpy_grid(30, &mut random), &mut random);
     let mut oracle = Oracle::new(&log).unwrap();
     let strategy = Strategy::EventPublished;
@@ -244,7 +245,7 @@ fn as_published_a_pan_is_followed_exactly() {
             let report = engine.advance(&[view]).unwrap();
             engine.assert_well_formed();
             assert_eq!(oracle.compare(&engine), None, "frame {frame}");
-            turn(&mut view, 0.0099, &mut random);
+            view = turned(view, 0.0099, &mut random);
             (changes, tests) = (changes + report.unfolds + report.folds, tests + report.tests);
         }
     }
@@ -263,7 +264,7 @@ fn a_millisecond_a_look() -> Duration {
 
 #[test]
 fn the_time_is_the_callers() {
-    let mut random = Random(3);
+    let mut random = seeded(3);
     let mesh = bumpy_grid(30, &mut random);
     let hierarchy = Arc::new(InMemoryHierarchy::new(&random_log(mesh, &mut random)).unwrap());
     let view = random_view(&mut random);

@@ -14,6 +14,10 @@ use foldfront::selection::queue::{DUE, Event, EventQueue, HORIZON, TICKS_PER_FRA
 use foldfront::selection::view::{Camera, View};
 use glam::DVec3;
 use proptest::prelude::*;
+use rand::RngExt;
+use rand_pcg::Pcg64;
+
+use crate::common::{direction, seeded};
 
 #[derive(Clone, Debug)]
 enum Operation {
@@ -197,11 +201,8 @@ proptest! {
         let criterion = if sphere_size { Criterion::SphereSize } else { Criterion::ScreenError };
         let heading = DVec3::from(heading).normalize_or_zero();
         let course = Course { heading, rho, stray, omega, kappa };
-        let mut random = Random(seed);
-        let mut views = vec![random.view(), random.view()];
-        if random.unit() < 0.5 {
-            views.pop();
-        }
+        let random = &mut seeded(seed);
+        let mut views: Vec<View> = (0..random.random_range(1..=2)).map(|_| random_view(random)).collect();
         let mut clock = Odometer::default();
         let mut active = criterion.unfold(&views, &bounds);
         let mut deadline = 0.0;
@@ -214,7 +215,7 @@ proptest! {
             deadline = f64::max(deadline, clock.now() + bound);
             let before = views.clone();
             for view in &mut views {
-                random.step(view, &course, center);
+                step(view, &course, center, random);
             }
             match clock.advance(&course, &before, &views) {
                 Motion::Rest => prop_assert_eq!(criterion.unfold(&views, &bounds), active),
@@ -223,7 +224,7 @@ proptest! {
             }
             let now_active = criterion.unfold(&views, &bounds);
             // Two at a time, the same is said of each.
-            let other = Bounds { radius: bounds.radius * random.unit() as f32, ..bounds };
+            let other = Bounds { radius: bounds.radius * random.random::<f32>(), ..bounds };
             let both = [now_active, criterion.unfold(&views, &other)];
             prop_assert_eq!(criterion.unfold_both(&views, [&bounds, &other]), both);
             if now_active != active {
@@ -344,46 +345,28 @@ fn a_bound_on_folding_is_the_later_of_leaving_and_the_first_of_two_times() {
     assert_eq!(earliest(&around, Course { omega: 1.0, kappa: 100.0, ..still() }), f64::INFINITY);
 }
 
-/// A small generator for motions; what matters is that they are varied and go straight for the marks.
-struct Random(u64);
+fn random_view(random: &mut Pcg64) -> View {
+    let beta: f64 = random.random_range(0.1..1.4);
+    let (eye, ahead) = (direction(random) * random.random_range(0.0..12.0), direction(random));
+    View::from_parts(eye, ahead, beta.cos(), beta.sin(), random.random_range(1.0..201.0)).unwrap()
+}
 
-impl Random {
-    fn unit(&mut self) -> f64 {
-        self.0 = self.0.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
-        (self.0 >> 11) as f64 / (1_u64 << 53) as f64
+/// Moves a view by up to full speed in each way at once, as often as not straight at or away from the centre.
+fn step(view: &mut View, course: &Course, center: [f32; 3], random: &mut Pcg64) {
+    let to_center = (DVec3::from(center.map(f64::from)) - view.eye()).normalize_or(DVec3::X);
+    let straight = if random.random() { to_center } else { -to_center };
+    let way = if random.random_bool(0.6) { straight } else { direction(random) };
+    let moved =
+        course.heading * course.rho * random.random::<f64>() + way * course.stray * random.random::<f64>();
+    *view = view.with_eye(view.eye() + moved).unwrap();
+    let aim = if random.random_bool(0.6) { straight } else { direction(random) };
+    let axis = view.direction().cross(aim);
+    if axis.length() > 1e-9 {
+        let turn = glam::DQuat::from_axis_angle(axis.normalize(), course.omega * random.random::<f64>());
+        *view = view.with_direction((turn * view.direction()).normalize()).unwrap();
     }
-
-    fn direction(&mut self) -> DVec3 {
-        loop {
-            let v = DVec3::new(self.unit(), self.unit(), self.unit()) * 2.0 - 1.0;
-            if (0.01..1.0).contains(&v.length_squared()) {
-                return v.normalize();
-            }
-        }
-    }
-
-    fn view(&mut self) -> View {
-        let beta = 0.1 + 1.3 * self.unit();
-        let (eye, direction) = (self.direction() * 12.0 * self.unit(), self.direction());
-        View::from_parts(eye, direction, beta.cos(), beta.sin(), 1.0 + 200.0 * self.unit()).unwrap()
-    }
-
-    /// Moves a view by up to full speed in each way at once, as often as not straight at or away from the centre.
-    fn step(&mut self, view: &mut View, course: &Course, center: [f32; 3]) {
-        let to_center = (DVec3::from(center.map(f64::from)) - view.eye()).normalize_or(DVec3::X);
-        let sign = if self.unit() < 0.5 { 1.0 } else { -1.0 };
-        let way = if self.unit() < 0.6 { to_center * sign } else { self.direction() };
-        let moved = course.heading * course.rho * self.unit() + way * course.stray * self.unit();
-        *view = view.with_eye(view.eye() + moved).unwrap();
-        let aim = if self.unit() < 0.6 { to_center * sign } else { self.direction() };
-        let axis = view.direction().cross(aim);
-        if axis.length() > 1e-9 {
-            let turn = glam::DQuat::from_axis_angle(axis.normalize(), course.omega * self.unit());
-            *view = view.with_direction((turn * view.direction()).normalize()).unwrap();
-        }
-        let steered = course.kappa * (self.unit() - 0.5) * 2.0;
-        *view = view.with_k((view.k() + steered).max(1.0)).unwrap();
-    }
+    let steered = course.kappa * random.random_range(-1.0..1.0);
+    *view = view.with_k((view.k() + steered).max(1.0)).unwrap();
 }
 
 /// Deadlines would leave 64 bits: a clock that has come to its end lets everything come up at every advance.

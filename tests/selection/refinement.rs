@@ -3,13 +3,15 @@
 
 use std::sync::Arc;
 
-use crate::common::{Random, meshes, random_log};
+use crate::common::{direction, meshes, random_log, seeded};
 use crate::unfolding::{Shown, assert_same, everything_unfolds_and_folds, expected};
 use foldfront::experiment::scene::SceneKind;
 use foldfront::testing::strict_mesh::StrictMesh;
 use foldfront::vertex_tree::{Hierarchy, MeshSink, NONE, NodeId, Step, VertexTree};
 use foldfront::{CollapseLog, Mesh};
 use in_memory::{InMemoryHierarchy, InMemoryTree};
+use rand::RngExt;
+use rand_pcg::Pcg64;
 
 #[test]
 fn a_closed_surface_unfolds_and_folds() {
@@ -18,17 +20,17 @@ fn a_closed_surface_unfolds_and_folds() {
 
 #[test]
 fn a_scan_unfolds_and_folds() {
-    everything_unfolds_and_folds("scan", &meshes::scan(14, &mut Random(4)));
+    everything_unfolds_and_folds("scan", &meshes::scan(14, &mut seeded(4)));
 }
 
 #[test]
 fn a_patchwork_unfolds_and_folds() {
-    everything_unfolds_and_folds("patchwork", &meshes::patchwork(12, &mut Random(5)));
+    everything_unfolds_and_folds("patchwork", &meshes::patchwork(12, &mut seeded(5)));
 }
 
 #[test]
 fn mountains_with_voids_unfold_and_fold() {
-    everything_unfolds_and_folds("mountains", &meshes::ground(120, 10, &mut Random(6)));
+    everything_unfolds_and_folds("mountains", &meshes::ground(120, 10, &mut seeded(6)));
 }
 
 #[test]
@@ -37,15 +39,15 @@ fn a_town_unfolds_and_folds() {
 }
 
 /// Triangles between any vertices at all, some of them with a doubled corner, some twice; vertices without triangles.
-fn nonsense(vertices: usize, triangles: usize, random: &mut Random) -> CollapseLog {
-    let positions = (0..vertices).map(|_| random.direction().as_vec3().to_array()).collect();
+fn nonsense(vertices: usize, triangles: usize, random: &mut Pcg64) -> CollapseLog {
+    let positions = (0..vertices).map(|_| direction(random).as_vec3().to_array()).collect();
     let used = vertices - vertices / 10;
-    let mut corner = || random.below(used) as u32;
+    let mut corner = || random.random_range(0..used as u32);
     let mut triangles: Vec<[u32; 3]> = (0..triangles).map(|_| [corner(), corner(), corner()]).collect();
     triangles.extend_from_within(..triangles.len() / 10);
     let mut log = random_log(Mesh { positions, triangles, ..Mesh::default() }, random);
     // As many roots as come.
-    log.collapses.truncate(vertices - 1 - random.below(vertices / 2));
+    log.collapses.truncate(vertices - 1 - random.random_range(0..vertices / 2));
     log
 }
 
@@ -64,9 +66,9 @@ fn strictly_shown(log: &CollapseLog, tree: &InMemoryTree, mesh: &StrictMesh) -> 
 #[test]
 fn any_order_of_steps_to_a_cut_shows_what_the_log_says() {
     for seed in 0..40 {
-        let mut random = Random(seed);
-        let vertices = 5 + random.below(60);
-        let triangles = random.below(200);
+        let mut random = seeded(seed);
+        let vertices = random.random_range(5..65);
+        let triangles = random.random_range(0..200);
         let log = nonsense(vertices, triangles, &mut random);
         let hierarchy = Arc::new(InMemoryHierarchy::new(&log).unwrap());
         let mut tree = InMemoryTree::new(hierarchy.clone());
@@ -77,8 +79,8 @@ fn any_order_of_steps_to_a_cut_shows_what_the_log_says() {
         let base = strictly_shown(&log, &tree, &mesh);
         for step in 0..600 {
             // Mostly unfolding for a while, then mostly folding.
-            let node = NodeId(random.below(log.collapses.len()) as u32);
-            let unfold = random.below(10) < if step / 100 % 2 == 0 { 8 } else { 2 };
+            let node = NodeId(random.random_range(0..log.collapses.len()) as u32);
+            let unfold = random.random_range(0..10) < if step / 100 % 2 == 0 { 8 } else { 2 };
             let can_unfold = !is_active(&active, node) && tree.parents(node).all(|p| is_active(&active, p));
             let can_fold = is_active(&active, node) && tree.children(node).all(|c| !is_active(&active, c));
             if unfold && can_unfold {
@@ -91,7 +93,7 @@ fn any_order_of_steps_to_a_cut_shows_what_the_log_says() {
             let flag = &mut active[hierarchy.log_number(node) as usize];
             *flag = !*flag;
             // Now and then many changes at once, of which later ones build on earlier ones.
-            if step % 100 < 50 && random.below(8) > 0 {
+            if step % 100 < 50 && random.random_ratio(7, 8) {
                 continue;
             }
             tree.update_mesh(&mut mesh);

@@ -10,7 +10,9 @@ mod paging;
 use crate::{Arrangement, BuildOptions, Io, Settings};
 use collapse_log::{CollapseLog, Mesh};
 use driver::{Driver, bytes_of, open};
-use meshes::{Random, grid, random_log, rubble, torus};
+use meshes::{grid, random_log, rubble, torus};
+use rand::{RngExt, SeedableRng};
+use rand_pcg::Pcg64;
 use vertex_tree::{Hierarchy, NodeId, VertexTree};
 
 fn options(levels: u32, quantize: bool, nest_needs: bool) -> BuildOptions {
@@ -22,15 +24,15 @@ fn blocking() -> Settings {
 }
 
 /// The mesh of each kind.
-fn kinds(random: &mut Random) -> [(&'static str, Mesh); 3] {
+fn kinds(random: &mut Pcg64) -> [(&'static str, Mesh); 3] {
     [("grid", grid(13, random)), ("torus", torus(12, random)), ("rubble", rubble(13, random))]
 }
 
 /// Unfolds everything, in random order.
-fn unfold_all(driver: &mut Driver, random: &mut Random) {
+fn unfold_all(driver: &mut Driver, random: &mut Pcg64) {
     let mut boundary = driver.boundary();
     while !boundary.is_empty() {
-        assert!(driver.unfold(boundary[random.below(boundary.len())]).unwrap());
+        assert!(driver.unfold(boundary[random.random_range(0..boundary.len())]).unwrap());
         boundary = driver.boundary();
     }
 }
@@ -55,7 +57,7 @@ fn fold_all(driver: &mut Driver) {
 fn every_step_leaves_a_manifold_mesh() {
     let (mut forced, mut still_needed, mut nodes) = (0, 0, 0);
     for seed in 0..12 {
-        let mut random = Random(seed);
+        let mut random = Pcg64::seed_from_u64(seed);
         for (kind, mesh) in kinds(&mut random) {
             let log = random_log(mesh, &mut random);
             let options = options(1 + seed as u32 % 5, seed % 2 == 1, seed % 3 == 0);
@@ -74,10 +76,10 @@ fn every_step_leaves_a_manifold_mesh() {
                 let collapsible: Vec<NodeId> =
                     driver.active.iter().copied().filter(|&n| driver.is_collapsible(n)).collect();
                 let up = step / 100 % 3 == 2;
-                if random.below(10) < if up { 8 } else { 2 } && !collapsible.is_empty() {
-                    driver.fold(collapsible[random.below(collapsible.len())]).unwrap();
+                if random.random_range(0..10) < if up { 8 } else { 2 } && !collapsible.is_empty() {
+                    driver.fold(collapsible[random.random_range(0..collapsible.len())]).unwrap();
                 } else if !boundary.is_empty() {
-                    assert!(driver.unfold(boundary[random.below(boundary.len())]).unwrap());
+                    assert!(driver.unfold(boundary[random.random_range(0..boundary.len())]).unwrap());
                 }
                 driver.tree.assert_well_formed();
                 if step % 50 == 0 {
@@ -121,7 +123,7 @@ fn assert_is_input(driver: &Driver, log: &CollapseLog) {
 /// Where nothing is kept of the mesh, steps are allowed and refused alike, and triangles are counted alike.
 #[test]
 fn selection_needs_no_mesh() {
-    let mut random = Random(5);
+    let mut random = Pcg64::seed_from_u64(5);
     let log = random_log(torus(14, &mut random), &mut random);
     let arrangement = Arrangement::new(&log, &options(3, false, false)).unwrap();
     let file = open(bytes_of(&arrangement));
@@ -132,15 +134,15 @@ fn selection_needs_no_mesh() {
         let nodes: Vec<NodeId> = driver.boundary();
         let collapsible: Vec<NodeId> =
             driver.active.iter().copied().filter(|&n| driver.is_collapsible(n)).collect();
-        if random.below(2) == 0 && !collapsible.is_empty() {
-            let node = collapsible[random.below(collapsible.len())];
+        if random.random() && !collapsible.is_empty() {
+            let node = collapsible[random.random_range(0..collapsible.len())];
             let step = driver.tree.fold(node, &mut driver.mesh).unwrap();
             assert_eq!(step, bare.fold(node, &mut vertex_tree::NullSink).unwrap());
             if step == vertex_tree::Step::Done {
                 driver.active.remove(&node);
             }
         } else if !nodes.is_empty() {
-            let node = nodes[random.below(nodes.len())];
+            let node = nodes[random.random_range(0..nodes.len())];
             let step = driver.tree.unfold(node, &mut driver.mesh).unwrap();
             assert_eq!(step, bare.unfold(node, &mut vertex_tree::NullSink).unwrap());
             if step == vertex_tree::Step::Done {
@@ -155,7 +157,7 @@ fn selection_needs_no_mesh() {
 /// The same log gives the same bytes.
 #[test]
 fn building_is_deterministic() {
-    let mut random = Random(9);
+    let mut random = Pcg64::seed_from_u64(9);
     let log = random_log(rubble(20, &mut random), &mut random);
     let build = || bytes_of(&Arrangement::new(&log, &BuildOptions::default()).unwrap());
     assert_eq!(build(), build());
@@ -163,7 +165,7 @@ fn building_is_deterministic() {
 
 #[test]
 fn options_out_of_range_are_an_error() {
-    let log = random_log(grid(4, &mut Random(1)), &mut Random(1));
+    let log = random_log(grid(4, &mut Pcg64::seed_from_u64(1)), &mut Pcg64::seed_from_u64(1));
     for levels in [0, 6, u32::MAX] {
         let error = Arrangement::new(&log, &options(levels, false, true)).err().unwrap();
         assert_eq!(error.to_string(), format!("{levels} levels a block, expected 1 to 5"));

@@ -107,24 +107,25 @@ impl LeafMap {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use rand::{RngExt, SeedableRng};
+    use rand_pcg::Pcg64;
     use std::collections::BTreeMap;
 
     #[test]
     fn agrees_with_an_ordered_map() {
         for range in [40, 1000, 1 << 31] {
             let (mut map, mut model) = (LeafMap::new(), BTreeMap::new());
-            let mut state = 1_u64;
+            let mut random = Pcg64::seed_from_u64(1);
             for step in 0..20_000_u32 {
-                state = state.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
-                let leaf = ((state >> 33) % range) as u32;
-                if state >> 20 & 1 == 0 {
+                let leaf = random.random_range(0..range);
+                if random.random() {
                     map.remove(leaf);
                     model.remove(&leaf);
                 } else {
                     assert_eq!(map.insert(leaf, step), !model.contains_key(&leaf));
                     model.entry(leaf).or_insert(step);
                 }
-                let probe = ((state >> 13) % range) as u32;
+                let probe = random.random_range(0..range);
                 assert_eq!(map.get(probe), model.get(&probe).copied().unwrap_or(NONE));
                 assert_eq!(map.len, model.len());
             }

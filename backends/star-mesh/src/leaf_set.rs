@@ -101,6 +101,8 @@ impl LeafSet {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use rand::{RngExt, SeedableRng};
+    use rand_pcg::Pcg64;
     use std::collections::BTreeSet;
 
     #[test]
@@ -108,18 +110,17 @@ mod tests {
         for limit in [1, 63, 64, 65, 4096, 4097, 300_000] {
             let mut set = LeafSet::new(limit);
             let mut model = BTreeSet::new();
-            let mut state = 1_u64;
+            let mut random = Pcg64::seed_from_u64(1);
             for _ in 0..3000 {
-                state = state.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
-                let number = ((state >> 33) % limit as u64) as u32;
-                if state >> 20 & 3 == 0 {
+                let number = random.random_range(0..limit as u32);
+                if random.random_ratio(1, 4) {
                     set.remove(number);
                     model.remove(&number);
                 } else {
                     set.insert(number);
                     model.insert(number);
                 }
-                let probe = ((state >> 13) % limit as u64) as u32;
+                let probe = random.random_range(0..limit as u32);
                 assert_eq!(set.at_or_below(probe), model.range(..=probe).next_back().copied());
             }
         }

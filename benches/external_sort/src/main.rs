@@ -28,6 +28,8 @@ use std::time::Instant;
 
 use foldfront_collapse_log::external::{Scratch, Sorter};
 use ext_sort::{ExternalChunk, ExternalSorterBuilder, LimitedBufferBuilder};
+use rand::{RngExt, SeedableRng};
+use rand_pcg::Pcg64;
 
 const CONTENDERS: [&str; 3] = ["ours", "extsort", "ext-sort"];
 
@@ -84,19 +86,12 @@ impl<const N: usize> Iterator for Run<N> {
     }
 }
 
-/// 64 well-spread bits (the finaliser of splitmix64, Steele et al. 2014).
-fn mix(number: u64) -> u64 {
-    let mut z = number.wrapping_add(0x9e37_79b9_7f4a_7c15);
-    z = (z ^ (z >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
-    z = (z ^ (z >> 27)).wrapping_mul(0x94d0_49bb_1331_11eb);
-    z ^ (z >> 31)
-}
-
 /// The records to be sorted.
 fn records<const N: usize>(count: u64) -> impl Iterator<Item = [u32; N]> {
-    (0..count).map(|i| {
-        let bits = mix(i);
-        std::array::from_fn(|word| if word == 0 { bits as u32 } else { (bits >> 32) as u32 + word as u32 })
+    let mut random = Pcg64::seed_from_u64(0);
+    (0..count).map(move |_| {
+        let [first, next]: [u32; 2] = random.random();
+        std::array::from_fn(|word| if word == 0 { first } else { next.wrapping_add(word as u32) })
     })
 }
 

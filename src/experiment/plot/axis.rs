@@ -1,4 +1,6 @@
 //! Ranges and ticks of the axes, and what is made of a series before it is drawn.
+//!
+//! By hand for now, as the page of the report is: both will be made anew together.
 
 /// Parts of a thousand of a series' values that may lie above the axis (and below, if it is logarithmic).
 const CLIPPED: usize = 2;

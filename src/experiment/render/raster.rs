@@ -1,4 +1,6 @@
 //! Fills triangles and draws lines, in horizontal bands that are independent of each other.
+//!
+//! By hand: the same input has to give the same bits, and these depend on the order of every operation.
 
 use super::image::Image;
 use super::projection::{Corner, Projection, SAMPLES};

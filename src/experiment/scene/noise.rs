@@ -1,5 +1,8 @@
 //! Noise and random numbers that are bit-identical on every platform.
 //!
+//! The generator is rand_pcg's. Noise is by hand: the bits of the scenes, and with them every frozen cut, depend on the order of
+//! every operation in it.
+//!
 //! Only `+ - * /` and `sqrt` on f64, which IEEE 754 defines exactly, and integer hashing: no function of the
 //! platform's mathematics library. Gradient noise after Perlin, "Improving Noise" (2002), with gradients hashed
 //! instead of tabulated; ridged multifractal after Musgrave, in Ebert et al., "Texturing and Modeling" (1994).

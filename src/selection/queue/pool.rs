@@ -125,3 +125,72 @@ impl Pool {
         }
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use std::panic::{AssertUnwindSafe, catch_unwind};
+
+    use super::*;
+    use crate::in_play::{Kind, Slot};
+
+    fn event(number: u32) -> Event {
+        Event::new(Event::BLANK.bounds, Slot(number), 0, Kind::Fold)
+    }
+
+    fn numbers(pool: &Pool, bucket: Bucket) -> Vec<u32> {
+        let mut numbers = Vec::new();
+        pool.read(bucket, |event| numbers.push(event.slot.0));
+        numbers
+    }
+
+    /// A bucket is a stack of chunks, read from the newest one.
+    #[test]
+    fn what_is_pushed_is_read_and_taken() {
+        let (mut pool, mut buckets) = (Pool::new(), [0; 3]);
+        // Three buckets that grow in turn, so that their chunks are mixed.
+        for number in 0..120 {
+            pool.push(&mut buckets[number as usize % 3], event(number));
+        }
+        pool.assert_used(9);
+        for (at, bucket) in (0..).zip(buckets) {
+            let own = |range: std::ops::Range<u32>| range.map(move |place| 3 * place + at);
+            let newest_first: Vec<u32> = own(32..40).chain(own(16..32)).chain(own(0..16)).collect();
+            assert_eq!(numbers(&pool, bucket), newest_first);
+        }
+        let mut due = [Event::BLANK; DUE];
+        let slots = |due: &[Event]| due.iter().map(|event| event.slot.0).collect::<Vec<_>>();
+        let bucket = &mut buckets[1];
+        // No more than there is room for behind those that there are.
+        due[..12].fill(event(1_000));
+        assert_eq!(pool.take(bucket, &mut due, 12, |_| true), (16, 4));
+        assert_eq!(slots(&due), [[1_000; 12].as_slice(), &[109, 112, 115, 118]].concat());
+        // To the border of a chunk, and only those to keep.
+        assert_eq!(pool.take(bucket, &mut due, 0, |event| event.slot.0 % 2 == 0), (2, 4));
+        assert_eq!(slots(&due[..2]), [100, 106]);
+        pool.assert_used(8);
+        assert_eq!(pool.take(bucket, &mut due, 0, |_| true), (16, 16));
+        assert_eq!(slots(&due), (16..32).map(|place| 3 * place + 1).collect::<Vec<_>>());
+        assert_eq!(pool.take(bucket, &mut due, 0, |_| false), (0, 16));
+        assert_eq!(*bucket, 0);
+        pool.assert_used(6);
+        // The others are as they were, and what has become free is used again.
+        assert_eq!(numbers(&pool, buckets[2]).len(), 40);
+        (0..48).for_each(|number| pool.push(&mut buckets[1], event(number)));
+        assert_eq!((pool.chunks.len(), pool.free.len()), (10, 0));
+        pool.assert_used(9);
+    }
+
+    /// Each check of a pool finds what it is for.
+    #[test]
+    fn a_pool_that_is_not_well_formed_is_found() {
+        let check = |used: usize, free: &[u32]| {
+            let (mut pool, mut bucket) = (Pool::new(), 0);
+            (0..80).for_each(|number| pool.push(&mut bucket, event(number)));
+            pool.free.extend_from_slice(free);
+            catch_unwind(AssertUnwindSafe(|| pool.assert_used(used))).is_err()
+        };
+        assert!(!check(5, &[]) && !check(2, &[2, 5, 4]));
+        assert!(check(4, &[]) && check(6, &[]), "a wrong count");
+        assert!(check(3, &[4, 4]), "a chunk that is free twice");
+    }
+}

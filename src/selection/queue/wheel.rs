@@ -160,3 +160,99 @@ fn bits(mut mask: u32) -> impl Iterator<Item = usize> {
         (bit < u32::BITS).then_some(bit as usize)
     })
 }
+
+#[cfg(test)]
+mod tests {
+    use std::panic::{AssertUnwindSafe, catch_unwind};
+
+    use super::*;
+
+    fn ticks(count: u64) -> f64 {
+        count as f64 / TICKS_PER_FRAME
+    }
+
+    /// A wheel at tick 1000 with an event in each of some slots.
+    fn wheel() -> (Wheel, Pool) {
+        let (mut wheel, mut pool) = (Wheel::new(), Pool::new());
+        wheel.advance(ticks(1_000), &mut Vec::new());
+        [0, 3, 9, 100, 101, 5_000, 5_700]
+            .iter()
+            .for_each(|&ahead| wheel.push(&mut pool, ahead, Event::BLANK));
+        wheel.assert_well_formed();
+        (wheel, pool)
+    }
+
+    /// A clock that does not get as far as the next event costs a comparison, so it has to know how far that is.
+    #[test]
+    fn a_wheel_knows_when_it_has_to_look() {
+        let (mut wheel, _) = wheel();
+        let mut ripe = Vec::new();
+        let mut advance = |wheel: &mut Wheel, tick: u64| {
+            wheel.advance(ticks(tick), &mut ripe);
+            wheel.assert_well_formed();
+            std::mem::take(&mut ripe).len()
+        };
+        // Up to 15 ticks ahead a slot is a tick wide; 100 and 101 ticks ahead it is 8, and both lie in that of 1096.
+        // 5000 and 5700 ticks ahead it is 512: those of 5632 and of 6656.
+        assert_eq!(wheel.next, 1_000);
+        assert_eq!((advance(&mut wheel, 1_000), wheel.next), (1, 1_003));
+        assert_eq!((advance(&mut wheel, 1_002), wheel.next), (0, 1_003));
+        assert_eq!((advance(&mut wheel, 1_020), wheel.next), (2, 1_096));
+        assert_eq!((advance(&mut wheel, 1_095), wheel.next), (0, 1_096));
+        assert_eq!((advance(&mut wheel, 1_096), wheel.next), (1, 5_632));
+        assert_eq!((advance(&mut wheel, 5_633), wheel.next), (1, 6_656));
+        assert!(!wheel.is_empty());
+        assert_eq!((advance(&mut wheel, 1 << 40), wheel.next, wheel.is_empty()), (1, u64::MAX, true));
+    }
+
+    #[test]
+    fn what_a_wheel_would_let_come_up_it_does() {
+        for last in [1_000, 1_003, 1_008, 1_009, 1_095, 1_096, 1_200, 5_631, 5_632, 6_656, 1 << 30, LAST_TICK]
+        {
+            let (mut wheel, _) = wheel();
+            let mut due: Vec<Bucket> = wheel.due_within(ticks(last)).filter(|&bucket| bucket != 0).collect();
+            let mut ripe = Vec::new();
+            wheel.advance(ticks(last), &mut ripe);
+            due.sort_unstable();
+            ripe.sort_unstable();
+            assert_eq!(due, ripe, "at tick {last}");
+            assert!(!ripe.is_empty());
+        }
+    }
+
+    /// Each check of a wheel's state finds what it is for.
+    #[test]
+    fn a_wheel_that_is_not_well_formed_is_found() {
+        let check = |spoil: &dyn Fn(&mut Wheel)| {
+            let (mut wheel, _) = wheel();
+            spoil(&mut wheel);
+            catch_unwind(AssertUnwindSafe(|| wheel.assert_well_formed())).is_err()
+        };
+        assert!(!check(&|_| {}));
+        for level in [0, 3, 9] {
+            assert!(check(&|wheel| wheel.in_use &= !(1 << level)), "level {level} is not marked");
+            assert!(
+                check(&|wheel| wheel.occupied[level] &= wheel.occupied[level] - 1),
+                "a slot of level {level} is not"
+            );
+        }
+        assert!(check(&|wheel| wheel.in_use |= 1 << 20), "a level that has nothing");
+        assert!(check(&|wheel| wheel.next = 1_001), "a slot of the narrowest level is passed over");
+        let passed_over = |tick: u64, next: u64| {
+            check(&|wheel| {
+                wheel.advance(ticks(tick), &mut Vec::new());
+                wheel.next = next;
+            })
+        };
+        // The present slot of a wider level has been drained: what is in it comes a round later, and may.
+        let fill_present = |wheel: &mut Wheel| {
+            wheel.levels[3][(1_000 >> 3) % 16] = 1;
+            wheel.occupied[3] |= 1 << ((1_000 >> 3) % 16);
+            wheel.next = 1_000 + 64;
+            (0..16).for_each(|slot| wheel.levels[0][slot] = 0);
+        };
+        assert!(!check(&fill_present), "a round later");
+        assert!(passed_over(1_020, 1_097) && !passed_over(1_020, 1_096));
+        assert!(passed_over(1_100, 5_633) && !passed_over(1_100, 5_632));
+    }
+}

@@ -377,3 +377,6 @@ fn process_plainly(
         }
     }
 }
+
+#[cfg(test)]
+mod tests;

@@ -116,3 +116,6 @@ fn scan(packed: &Packed, kind: Kind, lenses: Option<&[Lens]>, frame: &Frame, fli
         });
     }
 }
+
+#[cfg(test)]
+mod tests;

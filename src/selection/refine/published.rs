@@ -351,4 +351,153 @@ mod tests {
         assert!(a > b);
         assert_eq!(until(&[near, far], Kind::Fold, &bounds, 0.25, 1e-6), a);
     }
+
+    /// "Rapid Movements": by whichever of moving and turning takes longer, whole frames, at least one.
+    #[test]
+    fn frames_pass_as_at_full_speed() {
+        let speed = Speed { rho: 0.5, omega: 0.125, kappa: 0.0 };
+        let at = |x: f64| view(0.01).with_eye(DVec3::new(0.0, x, 0.0)).unwrap();
+        let turned = |angle: f64| {
+            view(0.01).with_direction(DVec3::new(libm::cos(angle), libm::sin(angle), 0.0)).unwrap()
+        };
+        let passed = |before: &[View], views: &[View]| {
+            let criterion = Criterion::ScreenError;
+            frames_passed(&Frame { criterion, views, speed, motion: Motion::Rest, cones: None }, before)
+        };
+        let one = |after: View| passed(&[at(0.0)], &[after]);
+        assert_eq!([at(0.0), at(0.4), at(0.5), at(0.6), at(3.0), at(-3.1)].map(one), [1, 1, 1, 2, 6, 7]);
+        assert_eq!([0.1, 0.2, 1.0, -1.01].map(|angle| one(turned(angle))), [1, 2, 8, 9]);
+        assert_eq!(one(turned(1.0).with_eye(DVec3::new(2.0, 0.0, 0.0)).unwrap()), 8);
+        assert_eq!(one(turned(0.2).with_eye(DVec3::new(2.0, 0.0, 0.0)).unwrap()), 4);
+        assert_eq!(passed(&[at(0.0), at(1.0), at(0.0)], &[at(0.0), at(3.0), at(0.6)]), 4);
+        // No more than the buffer spans, and all of it where views come or go.
+        assert_eq!(one(at(1e9)), HORIZON);
+        assert_eq!(passed(&[at(0.0)], &[at(0.0), at(0.0)]), HORIZON);
+        assert_eq!(passed(&[], &[]), 1);
+    }
+
+    /// Slots that a buffer lets come up when the frame counter moves on by so much.
+    struct Buffer {
+        published: Published,
+        front: Front,
+        x: f64,
+    }
+
+    impl Buffer {
+        fn go(&mut self, steps: f64) -> Vec<u32> {
+            let at = |x: f64| [view(0.01).with_eye(DVec3::new(x, 0.0, 0.0)).unwrap()];
+            let (before, after) = (at(self.x), at(self.x + steps));
+            self.x += steps;
+            let speed = Speed { rho: 1.0, omega: 1.0, kappa: 0.0 };
+            let frame = Frame {
+                criterion: Criterion::ScreenError,
+                views: &after,
+                speed,
+                motion: Motion::Rest,
+                cones: None,
+            };
+            let mut flips = Flips { tests: 3, ..Flips::default() };
+            self.published.find(&frame, &before, &self.front, &mut flips);
+            assert!(flips.fold.is_empty());
+            assert_eq!(flips.tests, 3 + flips.unfold.len() as u64);
+            let mut slots: Vec<u32> = flips.unfold.iter().map(|slot| slot.0).collect();
+            slots.sort_unstable();
+            slots
+        }
+
+        fn insert(&mut self, frames: f64, slot: u32) {
+            let ticket = *self.published.ticket(Slot(slot));
+            self.published.insert(frames, Entry { slot: Slot(slot), kind: Kind::Unfold, ticket });
+        }
+    }
+
+    /// One root, in which the eye is from `x = -1e6` to `1e6`: it must unfold whenever it is tested. Its slot is 2.
+    struct Everywhere;
+
+    impl vertex_tree::Hierarchy for Everywhere {
+        const IS_TREE: bool = true;
+
+        fn node_limit(&self) -> u32 {
+            1
+        }
+
+        fn displayed(&self) -> u64 {
+            0
+        }
+
+        fn roots(&self) -> &[vertex_tree::NodeId] {
+            &[vertex_tree::NodeId(0)]
+        }
+
+        fn bounds(&self, _: vertex_tree::NodeId) -> Bounds {
+            Bounds { center: [0.0; 3], radius: 1e6, eps: 1.0 }
+        }
+
+        fn children(&self, _: vertex_tree::NodeId) -> impl Iterator<Item = vertex_tree::NodeId> {
+            std::iter::empty()
+        }
+
+        fn parents(&self, _: vertex_tree::NodeId) -> impl Iterator<Item = vertex_tree::NodeId> {
+            std::iter::empty()
+        }
+    }
+
+    fn buffer() -> Buffer {
+        Buffer { published: Published::default(), front: Front::new(&Everywhere), x: 0.0 }
+    }
+
+    #[test]
+    fn an_entry_comes_up_in_its_frame() {
+        let mut buffer = buffer();
+        for round in 0..3 {
+            for (ahead, early) in [(3.0, 2.0), (10.0, 9.0), (4095.0, 4094.0)] {
+                buffer.insert(ahead, 2);
+                assert_eq!(buffer.go(early), [], "round {round}: {ahead} frames ahead");
+                assert_eq!(buffer.go(0.0), [2], "a frame at rest is a frame too");
+                assert_eq!(buffer.go(5.0), []);
+            }
+            // At least one, and no more than the buffer spans.
+            for (ahead, last) in [(0.0, 0.0), (-3.0, 0.0), (1e12, 4094.0), (f64::INFINITY, 4094.0)] {
+                buffer.insert(ahead, 2);
+                if last > 0.0 {
+                    assert_eq!(buffer.go(last), []);
+                }
+                assert_eq!(buffer.go(1.0), [2], "round {round}: {ahead} frames ahead");
+            }
+            // Two in one frame that was passed over, and everything after a leap.
+            buffer.insert(4.0, 2);
+            buffer.insert(5.0, 2);
+            assert_eq!(buffer.go(20.0), [2, 2]);
+            [1.0, 100.0, 4000.0].iter().for_each(|&ahead| buffer.insert(ahead, 2));
+            assert_eq!(buffer.go(5000.0), [2, 2, 2]);
+        }
+    }
+
+    #[test]
+    fn an_entry_that_is_not_watched_any_more_does_not_come_up() {
+        let mut buffer = buffer();
+        let views = [view(0.01)];
+        let speed = Speed { rho: 1.0, omega: 1.0, kappa: 0.0 };
+        let criterion = Criterion::ScreenError;
+        let frame = Frame { criterion, views: &views, speed, motion: Motion::Rest, cones: None };
+        let bounds = buffer.front.bounds(Slot(2));
+        let watched = |buffer: &Buffer| {
+            let mut watched = Vec::new();
+            buffer
+                .published
+                .for_each_watched(&buffer.front, &mut |slot, kind, _| watched.push((slot.0, kind)));
+            watched
+        };
+        buffer.published.watch(&frame, Slot(2), Kind::Unfold, bounds);
+        assert_eq!(watched(&buffer), [(2, Kind::Unfold)]);
+        assert_eq!((buffer.published.settle(), buffer.published.settle()), (1, 0));
+        buffer.published.unwatch(Slot(2));
+        assert_eq!(watched(&buffer), []);
+        assert_eq!(buffer.go(0.0), []);
+        // What is refused is due in the next frame.
+        buffer.published.refused(Slot(2), Kind::Unfold, bounds);
+        assert_eq!(watched(&buffer), [(2, Kind::Unfold)]);
+        assert_eq!((buffer.published.settle(), buffer.go(0.0)), (0, vec![2]));
+        assert_eq!(buffer.go(0.0), []);
+    }
 }

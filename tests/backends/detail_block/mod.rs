@@ -4,7 +4,7 @@
 mod cones;
 mod paging;
 
-use crate::common::{Random, data, meshes};
+use crate::common::{data, meshes, seeded};
 use crate::flights::flies;
 use foldfront::CollapseLog;
 use foldfront::construction::simplify;
@@ -15,7 +15,7 @@ fn closed() -> CollapseLog {
 }
 
 fn scan() -> CollapseLog {
-    data::log(meshes::scan(16, &mut Random(1)))
+    data::log(meshes::scan(16, &mut seeded(1)))
 }
 
 #[test]
@@ -32,7 +32,7 @@ fn open_scans_fly() {
 
 #[test]
 fn meshes_that_are_not_manifold_fly() {
-    flies("patchwork", &data::log(meshes::patchwork(16, &mut Random(2))), false, false);
+    flies("patchwork", &data::log(meshes::patchwork(16, &mut seeded(2))), false, false);
 }
 
 #[test]

@@ -7,13 +7,14 @@ use meta_node::{Dependencies, MetaNodeTree};
 
 use super::{EXACT, PAGES, grid, holder_bytes, settings, settle};
 use crate::common::backends::meta_node_file;
-use crate::common::{Random, data, meshes, random_step, random_view};
+use crate::common::{data, meshes, random_step, random_view, seeded};
 use crate::needs::{Needs, force_block_and_off};
+use rand::RngExt;
 
 #[test]
 fn dependencies_force_block_and_off() {
     force_block_and_off(&grid(50));
-    force_block_and_off(&data::log(meshes::scan(10, &mut Random(1))));
+    force_block_and_off(&data::log(meshes::scan(10, &mut seeded(1))));
 }
 
 /// Memory for a few pages, frames that do not wait, and every now and then a rest: chains of needed nodes that are longer
@@ -33,11 +34,11 @@ fn forcing_gets_there_with_little_memory() {
             let tree = MetaNodeTree::new(file.clone(), paging).unwrap();
             let mut engine = Engine::new(tree, NullSink, settings(strategy)).unwrap();
             let mut oracle = Oracle::new(&log).unwrap();
-            let mut random = Random(21);
+            let mut random = seeded(21);
             let mut view = random_view(&mut random);
             let mut beyond = 0;
             for round in 0..25 {
-                for _ in 0..random.below(20) {
+                for _ in 0..random.random_range(0..20) {
                     random_step(&mut view, &mut random);
                     engine.advance(&[view]).unwrap();
                     engine.assert_well_formed();

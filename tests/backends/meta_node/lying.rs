@@ -8,8 +8,8 @@ use foldfront::page_store::source::MemorySource;
 use meta_node::{BuildOptions, Dependencies, InUse, Io, MetaNodeFile, MetaNodeTree, Settings};
 
 use super::grid;
-use crate::common::Random;
 use crate::common::backends::meta_node_bytes;
+use crate::common::seeded;
 use crate::lies::{follow, put, section, tell_lies, word};
 
 fn open(bytes: Vec<u8>) -> Option<Arc<MetaNodeFile>> {
@@ -44,7 +44,7 @@ fn pages_that_lie_are_faults() {
     let (mut found, mut faults, mut errors) = (0, 0, 0);
     for seed in 0..900 {
         let mut lying = bytes.clone();
-        tell_lies(&mut lying, &pages, &mut Random(seed));
+        tell_lies(&mut lying, &pages, &mut seeded(seed));
         let Some(file) = open(lying) else { continue };
         found += u32::from(file.verify().is_err());
         let tree = MetaNodeTree::new(file.clone(), settings(seed, &file)).unwrap();

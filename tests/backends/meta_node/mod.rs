@@ -8,7 +8,7 @@ use std::sync::Arc;
 use std::time::Duration;
 
 use crate::common::backends::{meta_node_bytes, meta_node_file};
-use crate::common::{Random, bumpy_grid, random_log, random_step, random_view};
+use crate::common::{bumpy_grid, random_log, random_step, random_view, seeded};
 use crate::needs::{EXACT, PAGES};
 use foldfront::collapse_log::CollapseLog;
 use foldfront::construction::simplify;
@@ -22,10 +22,11 @@ use foldfront::testing::strict_mesh::StrictMesh;
 use foldfront::vertex_tree::{Hierarchy, MeshSink, NullSink};
 use in_memory::{InMemoryHierarchy, InMemoryTree};
 use meta_node::{Dependencies, InUse, MetaNodeFile, MetaNodeTree};
+use rand::RngExt;
 
 /// A simplified mesh with good triangles.
 fn grid(side: usize) -> CollapseLog {
-    let mesh = bumpy_grid(side, &mut Random(3));
+    let mesh = bumpy_grid(side, &mut seeded(3));
     simplify::build(mesh, &simplify::Options::default(), &mut |_, _| ()).unwrap().0
 }
 
@@ -53,7 +54,7 @@ fn settle<M: MeshSink>(engine: &mut Engine<MetaNodeTree, M>, views: &[View]) -> 
 /// oracle's, whatever the strategy, and memory has never been more than allowed.
 #[test]
 fn a_camera_that_stops_always_gets_its_cut() {
-    let mut random = Random(1);
+    let mut random = seeded(1);
     for (log, holders) in
         [(grid(60), 4), (grid(60), 40), (random_log(bumpy_grid(50, &mut random), &mut random), 6)]
     {
@@ -64,11 +65,11 @@ fn a_camera_that_stops_always_gets_its_cut() {
         for strategy in EXACT {
             let tree = MetaNodeTree::new(file.clone(), paging).unwrap();
             let mut engine = Engine::new(tree, NullSink, settings(strategy)).unwrap();
-            let mut random = Random(9);
+            let mut random = seeded(9);
             let mut view = random_view(&mut random);
             let mut misses = 0;
             for round in 0..40 {
-                for _ in 0..random.below(40) {
+                for _ in 0..random.random_range(0..40) {
                     random_step(&mut view, &mut random);
                     let report = engine.advance(&[view]).unwrap();
                     engine.assert_well_formed();
@@ -95,10 +96,10 @@ fn memory_may_change_while_the_camera_moves() {
     let tree = MetaNodeTree::new(file, meta_node::Settings::default()).unwrap();
     let mut engine = Engine::new(tree, NullSink, settings(Strategy::Event)).unwrap();
     let mut oracle = Oracle::new(&log).unwrap();
-    let mut random = Random(4);
+    let mut random = seeded(4);
     let mut view = random_view(&mut random);
     for round in 0..60 {
-        let holders = if round % 5 == 0 { 100_000 } else { 4 + random.below(60) as u64 };
+        let holders = if round % 5 == 0 { 100_000 } else { random.random_range(4..64) };
         // Nothing is being read, and what is allowed holds from the first frame on.
         engine.tree_mut().settle().unwrap();
         engine.advance(&[view]).unwrap();
@@ -130,7 +131,7 @@ fn where_pages_in_use_stay_the_front_still_follows() {
     let mut oracle = Oracle::new(&log).unwrap();
     let mut engine =
         Engine::new(MetaNodeTree::new(file, paging).unwrap(), NullSink, settings(Strategy::Event)).unwrap();
-    let mut random = Random(4);
+    let mut random = seeded(4);
     let mut view = random_view(&mut random);
     let mut coarser = 0;
     for _ in 0..40 {
@@ -188,7 +189,7 @@ fn the_displayed_mesh_is_that_of_the_in_memory_tree() {
         let mut engine = Engine::new(tree, StrictMesh::default(), settings(Strategy::Event)).unwrap();
         let reference = InMemoryTree::new(hierarchy.clone());
         let mut reference = Engine::new(reference, StrictMesh::default(), settings(Strategy::Event)).unwrap();
-        let mut random = Random(6);
+        let mut random = seeded(6);
         let mut view = random_view(&mut random);
         let mut equal = 0;
         for _ in 0..60 {
@@ -221,7 +222,7 @@ fn frames_go_on_while_the_store_fails() {
     let tree = MetaNodeTree::new(file, paging).unwrap();
     let mut engine = Engine::new(tree, NullSink, settings(Strategy::Event)).unwrap();
     let mut oracle = Oracle::new(&log).unwrap();
-    let mut random = Random(8);
+    let mut random = seeded(8);
     let mut view = random_view(&mut random);
     let mut faults = 0;
     for round in 0..6 {

@@ -14,7 +14,8 @@ use meta_node::{InUse, Io, MetaNodeFile, MetaNodeTree};
 
 use super::{PAGES, grid, holder_bytes, settings};
 use crate::common::backends::{combinations, meta_node_file};
-use crate::common::{Random, random_step, random_view};
+use crate::common::{random_step, random_view, seeded};
+use rand::RngExt;
 
 const FRAME: Duration = Duration::from_millis(16);
 
@@ -71,11 +72,11 @@ fn a_camera_that_stops_gets_its_cut_in_time() {
     let mut oracle = Oracle::new(&log).unwrap();
     for (strategy, prefetch) in combinations() {
         let mut engine = engine(&file, u64::MAX, InUse::Yields, (strategy, prefetch), store);
-        let mut random = Random(31);
+        let mut random = seeded(31);
         let mut waits = 0;
         for _ in 0..20 {
             let mut view = random_view(&mut random);
-            for _ in 0..random.below(12) {
+            for _ in 0..random.random_range(0..12) {
                 random_step(&mut view, &mut random);
                 advance(&mut engine, view);
             }
@@ -117,7 +118,7 @@ fn a_camera_at_rest_comes_to_rest() {
             let name = format!("{}, {in_use:?}, {holders} place holders", prefetch.name());
             let how = (Strategy::Event, prefetch);
             let mut engine = engine(&file, holders * holder_bytes(&file), in_use, how, store);
-            let mut random = Random(41);
+            let mut random = seeded(41);
             let (mut no_room, mut coarser) = (0, 0);
             for _ in 0..8 {
                 let mut view = random_view(&mut random);
@@ -157,7 +158,7 @@ fn virtual_time_repeats_itself() {
         let replay = || {
             let how = (Strategy::Event, prefetch);
             let mut engine = engine(&file, 60 * holder_bytes(&file), InUse::Yields, how, store);
-            let mut random = Random(51);
+            let mut random = seeded(51);
             let mut view = random_view(&mut random);
             let frames: Vec<_> = (0..300)
                 .map(|_| {

@@ -11,7 +11,7 @@ use mt_partition::{
 };
 
 use super::{all_around, ball_log, finest};
-use crate::common::Random;
+use crate::common::seeded;
 use crate::lies::{Outcome, follow, put, section, tell_lies, word};
 use foldfront::testing::strict_mesh::StrictMesh;
 
@@ -127,7 +127,7 @@ fn nodes_that_lie_are_faults() {
     let (mut found, mut faults, mut opened) = (0, 0, 0);
     for seed in 0..400 {
         let mut lying = bytes.clone();
-        tell_lies(&mut lying, &records, &mut Random(seed));
+        tell_lies(&mut lying, &records, &mut seeded(seed));
         let Ok(file) = open(lying) else { continue };
         opened += 1;
         found += u32::from(file.verify().is_err());

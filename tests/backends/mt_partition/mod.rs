@@ -10,7 +10,7 @@ mod within;
 
 use std::sync::Arc;
 
-use crate::common::{Random, data, random_step, random_view};
+use crate::common::{data, random_step, random_view, seeded};
 use crate::patches::{advance_settled, all_around, finest};
 use foldfront::selection::criterion::Criterion;
 use foldfront::selection::engine::{Engine, Settings};
@@ -19,6 +19,7 @@ use foldfront::vertex_tree::MeshSink;
 use foldfront::{CollapseLog, Mesh};
 use glam::DVec3;
 use mt_partition::{CacheMode, Memory, MtFile, MtTree};
+use rand_pcg::Pcg64;
 
 /// A closed surface of extent about 2: a subdivided octahedron with bumps. Each level has four times the triangles.
 fn bumpy_ball(levels: u32) -> Mesh {
@@ -52,13 +53,13 @@ fn ball_log(levels: u32) -> CollapseLog {
 
 /// A walk around the origin that rests, hurries and teleports.
 struct Walk {
-    random: Random,
+    random: Pcg64,
     view: View,
 }
 
 impl Walk {
     fn new(seed: u64, k: f64) -> Self {
-        let mut random = Random(seed);
+        let mut random = seeded(seed);
         Self { view: random_view(&mut random).with_k(k).unwrap(), random }
     }
 

@@ -8,7 +8,7 @@ use foldfront::{Hierarchy, Mesh};
 use mt_partition::{BuildOptions, CacheMode, Memory, MtTree, QueueOrder};
 
 use super::{Walk, advance_settled, ball_log, engine};
-use crate::common::{Random, bumpy_grid, data, graph_cut, meshes};
+use crate::common::{bumpy_grid, data, graph_cut, meshes, seeded};
 use crate::patches::{assert_finest_is_input, displayed, verifies_and_is_the_input};
 use foldfront::testing::strict_mesh::StrictMesh;
 
@@ -85,7 +85,7 @@ fn every_cut_of_a_closed_surface_is_closed() {
 /// edges cancel everywhere but along the boundary, which only ever goes through input vertices of the boundary.
 #[test]
 fn a_surface_with_a_boundary_has_no_other() {
-    let log = data::log(bumpy_grid(33, &mut Random(5)));
+    let log = data::log(bumpy_grid(33, &mut seeded(5)));
     let rim = |v: u32| [v % 33, v / 33].iter().any(|at| [0, 32].contains(at));
     let file = graph_cut::file(&log, &options(10.0, 20));
     let mut engine = engine(&file, CacheMode::PCc, Memory::default(), StrictMesh::default());
@@ -103,10 +103,10 @@ fn a_surface_with_a_boundary_has_no_other() {
 #[test]
 fn meshes_of_all_kinds() {
     for (name, mesh) in [
-        ("scan", meshes::scan(14, &mut Random(1))),
-        ("patchwork", meshes::patchwork(12, &mut Random(2))),
+        ("scan", meshes::scan(14, &mut seeded(1))),
+        ("patchwork", meshes::patchwork(12, &mut seeded(2))),
         ("handles", meshes::with_handles(5, 10)),
-        ("mountains with voids", meshes::ground(80, 8, &mut Random(3))),
+        ("mountains with voids", meshes::ground(80, 8, &mut seeded(3))),
         ("town", meshes::part_of(SceneKind::City, 0.3)),
     ] {
         verifies_and_is_the_input(name, &data::log(mesh));

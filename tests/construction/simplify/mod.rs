@@ -5,7 +5,7 @@
 
 mod out_of_core;
 
-use crate::common::{Random, meshes};
+use crate::common::{meshes, seeded};
 use crate::hierarchy::{check, errors_are_honest, is_deterministic, simplify, simplify_and_check};
 use foldfront::Mesh;
 use foldfront::collapse_log::LogError;
@@ -27,24 +27,24 @@ macro_rules! made_up {
 
 made_up!(closed_surface, meshes::with_handles(3, 16), false, .base_triangles < 100);
 made_up!(closed_surface_of_high_genus, meshes::with_handles(20, 8), false, .base_triangles < 500);
-made_up!(scan, meshes::scan(16, &mut Random(1)), false, .base_triangles < 1000);
-made_up!(scan_joined, meshes::scan(16, &mut Random(1)), true, .roots < 10);
-made_up!(patchwork, meshes::patchwork(14, &mut Random(2)), false, .base_triangles < 1000);
-made_up!(mountains, meshes::ground(150, 0, &mut Random(3)), false, .roots < 10);
-made_up!(mountains_with_voids, meshes::ground(150, 20, &mut Random(3)), false, .base_triangles < 5000);
+made_up!(scan, meshes::scan(16, &mut seeded(1)), false, .base_triangles < 1000);
+made_up!(scan_joined, meshes::scan(16, &mut seeded(1)), true, .roots < 10);
+made_up!(patchwork, meshes::patchwork(14, &mut seeded(2)), false, .base_triangles < 1000);
+made_up!(mountains, meshes::ground(150, 0, &mut seeded(3)), false, .roots < 10);
+made_up!(mountains_with_voids, meshes::ground(150, 20, &mut seeded(3)), false, .base_triangles < 5000);
 made_up!(laserscan, meshes::part_of(SceneKind::Laserscan, 0.25), false, .roots < 10);
 made_up!(town, meshes::part_of(SceneKind::City, 0.5), false, .roots > 500);
 made_up!(town_joined, meshes::part_of(SceneKind::City, 0.5), true, .roots < 10);
 
 #[test]
 fn the_same_mesh_comes_to_the_same_hierarchy() {
-    is_deterministic(&meshes::patchwork(14, &mut Random(2)));
+    is_deterministic(&meshes::patchwork(14, &mut seeded(2)));
 }
 
 #[test]
 fn cuts_keep_what_their_errors_promise() {
     errors_are_honest(&meshes::with_handles(2, 24));
-    errors_are_honest(&meshes::scan(20, &mut Random(4)));
+    errors_are_honest(&meshes::scan(20, &mut seeded(4)));
 }
 
 /// A mesh from corner lists, one letter a vertex.

@@ -11,7 +11,7 @@ use foldfront::container::Georeference;
 use foldfront::experiment::scene::SceneKind;
 
 use super::{difficult, flat_grid};
-use crate::common::{Random, meshes};
+use crate::common::{meshes, seeded};
 use crate::hierarchy::options;
 use crate::within;
 use crate::within::{assert_same, limits, names, send};
@@ -34,7 +34,7 @@ fn difficult_meshes_are_the_same_within_little_memory() {
 
 #[test]
 fn the_result_does_not_depend_on_the_memory() {
-    within::the_memory_does_not_matter(&meshes::scan(20, &mut Random(1)));
+    within::the_memory_does_not_matter(&meshes::scan(20, &mut seeded(1)));
 }
 
 #[test]
@@ -60,12 +60,12 @@ fn components_are_merged_within_little_memory() {
 
 #[test]
 fn a_scan_with_memory_for_a_twentieth() {
-    within::a_twentieth_is_enough(&meshes::scan(30, &mut Random(2)));
+    within::a_twentieth_is_enough(&meshes::scan(30, &mut seeded(2)));
 }
 
 #[test]
 fn mountains_with_memory_for_a_twentieth() {
-    within::a_twentieth_is_enough(&meshes::ground(220, 10, &mut Random(3)));
+    within::a_twentieth_is_enough(&meshes::ground(220, 10, &mut seeded(3)));
 }
 
 /// Wherever it is stopped, it ends with an error; what was there before is still there, and nothing else.

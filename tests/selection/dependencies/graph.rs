@@ -5,13 +5,14 @@ use std::cell::RefCell;
 use std::collections::BTreeSet;
 use std::rc::Rc;
 
+use crate::common::{direction, seeded};
 use foldfront::Bounds;
 use foldfront::selection::criterion::Criterion;
 use foldfront::selection::view::View;
 use foldfront::vertex_tree::{Hierarchy, MeshSink, NodeId, PageStats, Step, TreeError, VertexTree};
 use glam::DVec3;
-
-use crate::common::Random;
+use rand::RngExt;
+use rand_pcg::Pcg64;
 
 /// What depends on what. Every prerequisite of a node has a smaller number.
 #[derive(Clone, Debug, Default)]
@@ -36,7 +37,7 @@ pub struct Shape {
 }
 
 impl Graph {
-    pub fn random(shape: Shape, random: &mut Random) -> Self {
+    pub fn random(shape: Shape, random: &mut Pcg64) -> Self {
         let Shape { nodes, parents, needing } = shape;
         let mut graph = Self {
             parents: vec![Vec::new(); nodes],
@@ -52,10 +53,10 @@ impl Graph {
             }
             // Near in number, so that the graph is deep; now and then from far up, so that some nodes have many
             // children.
-            let mut above: Vec<usize> = (0..=random.below(parents))
+            let mut above: Vec<usize> = (0..=random.random_range(0..parents))
                 .map(|_| {
-                    let lowest = if random.below(4) == 0 { 0 } else { n.saturating_sub(40) };
-                    lowest + random.below(n - lowest)
+                    let lowest = if random.random_ratio(1, 4) { 0 } else { n.saturating_sub(40) };
+                    lowest + random.random_range(0..n - lowest)
                 })
                 .collect();
             above.sort_unstable();
@@ -64,11 +65,11 @@ impl Graph {
                 graph.parents[n].push(NodeId(p as u32));
                 graph.children[p].push(NodeId(n as u32));
             }
-            if random.below(100) < needing {
-                for _ in 0..=random.below(3) {
+            if random.random_range(0..100) < needing {
+                for _ in 0..=random.random_range(0..3) {
                     // Anywhere, or next to it, where two parents of one node may need each other.
-                    let lowest = if random.below(2) == 0 { 0 } else { n.saturating_sub(8) };
-                    let needed = lowest + random.below(n - lowest);
+                    let lowest = if random.random() { 0 } else { n.saturating_sub(8) };
+                    let needed = lowest + random.random_range(0..n - lowest);
                     graph.needs[n].push(NodeId(needed as u32));
                     graph.needed_by[needed].push(NodeId(n as u32));
                 }
@@ -77,8 +78,8 @@ impl Graph {
         graph.bounds = vec![Bounds { center: [0.0; 3], radius: 0.0, eps: 0.0 }; nodes];
         for n in (0..nodes).rev() {
             // Small and anywhere at the bottom, and around everything below further up.
-            let center = 0.9 * random.direction() * random.unit();
-            let eps = (0.004 * random.unit() * random.unit()) as f32;
+            let center = 0.9 * direction(random) * random.random::<f64>();
+            let eps = (random.random_range(0.0..0.004) * random.random::<f64>()) as f32;
             let own = Bounds { center: center.as_vec3().to_array(), radius: 0.02, eps };
             let below = graph.children[n].iter().map(|c| graph.bounds[c.index()]);
             graph.bounds[n] = below.fold(own, around);
@@ -156,7 +157,7 @@ pub struct GraphTree {
     graph: Rc<Graph>,
     pub log: Rc<RefCell<Log>>,
     paging: Option<Paging>,
-    random: Random,
+    random: Pcg64,
     frame: u64,
     /// For each node, until which frame it is there, and when it comes if it has been asked for.
     resident_until: Vec<u64>,
@@ -176,7 +177,7 @@ impl GraphTree {
             graph,
             log: Rc::new(RefCell::new(log)),
             paging,
-            random: Random(77),
+            random: seeded(77),
             frame: 0,
             resident_until: vec![0; nodes],
             arriving: vec![None; nodes],
@@ -215,11 +216,11 @@ impl GraphTree {
             return true;
         }
         if self.arriving[n].is_none() {
-            if self.random.below(100) >= missing {
+            if self.random.random_range(0..100) >= missing {
                 self.resident_until[n] = self.frame + STAYS;
                 return true;
             }
-            self.arriving[n] = Some(self.frame + 1 + self.random.below(latency) as u64);
+            self.arriving[n] = Some(self.frame + 1 + self.random.random_range(0..latency) as u64);
         }
         let mut log = self.log.borrow_mut();
         log.in_vain += u64::from(!log.refused.insert(node.0));

@@ -8,13 +8,15 @@ use std::collections::BTreeMap;
 use std::rc::Rc;
 
 use crate::common::foreseen::Foreseen;
-use crate::common::{Random, random_step, random_view};
+use crate::common::{direction, random_step, random_view, seeded};
 use foldfront::selection::engine::{Engine, Settings};
 use foldfront::selection::front::mix;
 use foldfront::selection::refine::Strategy;
 use foldfront::selection::view::View;
 use foldfront::vertex_tree::NullSink;
 use graph::{Call, Graph, GraphTree, Log, Paging, Shape};
+use rand::RngExt;
+use rand_pcg::Pcg64;
 
 const EXACT: [Strategy; 3] = [Strategy::TopDown, Strategy::Front, Strategy::Event];
 
@@ -47,6 +49,13 @@ impl Walker {
         (differ(false), differ(true))
     }
 
+    /// Nodes whose fold is refused for want of a page, and that something has come to need since.
+    fn needed_meanwhile(&self) -> u64 {
+        let log = self.log.borrow();
+        let is_needed = |n: usize| self.graph.needed_by[n].iter().any(|&by| log.active[by.index()]);
+        log.refused.iter().filter(|&&n| log.active[n as usize] && is_needed(n as usize)).count() as u64
+    }
+
     /// The engine's front is what the backend has done, and a valid one.
     fn assert_valid(&self, what: &str) {
         let log = self.log.borrow();
@@ -66,11 +75,11 @@ impl Walker {
 }
 
 /// One frame of a walk that rests, hurries and teleports; what wants more than one view gets it now and then.
-fn step(views: &mut Vec<View>, random: &mut Random) {
+fn step(views: &mut Vec<View>, random: &mut Pcg64) {
     for view in views.iter_mut() {
         random_step(view, random);
     }
-    match random.below(100) {
+    match random.random_range(0..100) {
         0 => views.push(random_view(random).with_k(40.0).unwrap()),
         1 if views.len() > 1 => drop(views.pop()),
         _ => {}
@@ -79,7 +88,7 @@ fn step(views: &mut Vec<View>, random: &mut Random) {
 
 fn shapes(needing: usize) -> impl Iterator<Item = (u64, Rc<Graph>)> {
     (0..12).map(move |seed| {
-        let mut random = Random(seed);
+        let mut random = seeded(seed);
         let shape = Shape { nodes: 60 + 60 * seed as usize, parents: 1 + seed as usize % 4, needing };
         (seed, Rc::new(Graph::random(shape, &mut random)))
     })
@@ -90,7 +99,7 @@ fn assert_exact(needing: usize) -> (u64, u64, u64) {
     let (mut forced, mut named, mut still_needed) = (0, 0, 0);
     for (seed, graph) in shapes(needing) {
         for mut walker in Walker::all(&graph, None) {
-            let mut random = Random(seed + 100);
+            let mut random = seeded(seed + 100);
             let mut views = vec![random_view(&mut random)];
             for frame in 0..400 {
                 step(&mut views, &mut random);
@@ -132,9 +141,9 @@ fn what_several_parents_lead_to_is_foreseen_once() {
             let settings = Settings { strategy, rho: 0.02, ..Settings::default() };
             let tree = Foreseen::new(GraphTree::new(graph.clone(), None), 4);
             let mut engine = Engine::new(tree, NullSink, settings).unwrap();
-            let mut random = Random(seed + 300);
+            let mut random = seeded(seed + 300);
             let start = random_view(&mut random);
-            let step = random.direction() * 0.01;
+            let step = direction(&mut random) * 0.01;
             let at = |frame: u32| start.with_eye(start.eye() + step * f64::from(frame)).unwrap();
             for frame in 0..80 {
                 engine.advance(&[at(frame)]).unwrap();
@@ -168,7 +177,7 @@ fn pages_that_come_late_are_waited_for_and_counted() {
         let paging = Paging { missing, latency: 4 };
         for (seed, graph) in shapes(needing) {
             for mut walker in Walker::all(&graph, Some(paging)) {
-                let mut random = Random(seed + 100);
+                let mut random = seeded(seed + 100);
                 let mut views = vec![random_view(&mut random)];
                 let (mut lagging, mut misses) = (0, 0);
                 for round in 0..25 {
@@ -195,7 +204,10 @@ fn pages_that_come_late_are_waited_for_and_counted() {
                     for _ in 0..3 {
                         let report = walker.engine.advance(&views).unwrap();
                         walker.engine.assert_well_formed();
-                        assert_eq!((report.misses, report.unfolds, report.folds), (0, 0, 0), "{what}");
+                        // A fold that waits for its page is counted until that comes, although something needs the node by
+                        // now: only the backend knows of that.
+                        let needed = walker.needed_meanwhile();
+                        assert_eq!((report.misses, report.unfolds, report.folds), (needed, 0, 0), "{what}");
                         misses += report.misses;
                     }
                 }
@@ -213,19 +225,19 @@ fn assert_recovers(call: Call, needing: usize) {
     let mut failures = 0;
     for (seed, graph) in shapes(needing) {
         for mut walker in Walker::all(&graph, None) {
-            let mut random = Random(seed + 100);
+            let mut random = seeded(seed + 100);
             let mut views = vec![random_view(&mut random)];
             for frame in 0..200 {
                 let what = format!("{call:?}, seed {seed}, frame {frame}");
                 step(&mut views, &mut random);
-                if random.below(3) == 0 {
-                    walker.log.borrow_mut().fail = Some((call, random.below(4)));
+                if random.random_ratio(1, 3) {
+                    walker.log.borrow_mut().fail = Some((call, random.random_range(0..4)));
                 }
                 if walker.engine.advance(&views).is_err() {
                     failures += 1;
                     walker.assert_valid(&what);
                     // The same views again, or others.
-                    if random.below(2) == 0 {
+                    if random.random() {
                         step(&mut views, &mut random);
                     }
                     walker.log.borrow_mut().fail = None;

@@ -3,13 +3,14 @@
 
 use std::f64::consts::PI;
 
+use crate::common::{direction, seeded};
 use foldfront::Bounds;
 use foldfront::selection::criterion::Criterion;
 use foldfront::selection::motion::{Course, Motion, Odometer};
 use foldfront::selection::view::View;
 use glam::{DQuat, DVec3};
-
-use crate::common::Random;
+use rand::RngExt;
+use rand_pcg::Pcg64;
 
 /// What a camera does in a frame.
 #[derive(Clone, Copy, Debug)]
@@ -45,53 +46,55 @@ struct Case {
     distance: f64,
 }
 
-fn between(random: &mut Random, low: f64, high: f64) -> f64 {
-    (low.ln() + (high / low).ln() * random.unit()).exp()
+fn between(random: &mut Pcg64, low: f64, high: f64) -> f64 {
+    (low.ln() + (high / low).ln() * random.random::<f64>()).exp()
 }
 
 impl Case {
-    fn random(random: &mut Random) -> Self {
-        let scale = [1e-35, 1e-20, 1.0, 1.0, 1e3, 1e30][random.below(6)];
-        let center = (random.direction() * scale * random.unit()).to_array().map(|x| x as f32);
+    fn random(random: &mut Pcg64) -> Self {
+        let scale = [1e-35, 1e-20, 1.0, 1.0, 1e3, 1e30][random.random_range(0..6)];
+        let center = (direction(random) * scale * random.random::<f64>()).to_array().map(|x| x as f32);
         let distance = scale * between(random, 1e-3, 1e3);
-        let to_center = random.direction();
+        let to_center = direction(random);
         let eye = DVec3::from(center.map(f64::from)) - to_center * distance;
         // What it comes to with the eye and the centre as they are rounded.
         let to_center = DVec3::from(center.map(f64::from)) - eye;
         let (distance, to_center) = (to_center.length(), to_center.normalize());
         let side = to_center.any_orthonormal_vector();
-        let side = (DQuat::from_axis_angle(to_center, 6.3 * random.unit()) * side).normalize();
+        let side = (DQuat::from_axis_angle(to_center, random.random_range(0.0..6.3)) * side).normalize();
 
-        let beta = [1e-8, between(random, 1e-8, 1.57), between(random, 0.1, 1.57), 1.57][random.below(4)];
+        let beta =
+            [1e-8, between(random, 1e-8, 1.57), between(random, 0.1, 1.57), 1.57][random.random_range(0..4)];
         // How far the centre is from the axis: on it, within the cone, near its line, anywhere.
-        let alpha = match random.below(6) {
+        let alpha = match random.random_range(0..6) {
             0 => 0.0,
-            1 => beta * random.unit(),
+            1 => beta * random.random::<f64>(),
             2 => beta * (1.0 + between(random, 1e-6, 1.0)),
             3 => beta + between(random, 1e-9, 0.1),
-            4 => 1e-8 * 4.0 * random.unit(),
-            _ => PI * random.unit(),
+            4 => random.random_range(0.0..4e-8),
+            _ => random.random_range(0.0..PI),
         };
         let direction = (to_center * alpha.cos() + side * alpha.sin()).normalize();
         let line = distance * (alpha - beta).sin();
         // The sphere: a point, near the cone from either side, anything.
-        let near = 1.0 + [-1.0, 1.0][random.below(2)] * between(random, 1e-6, 1.0);
-        let radius = match random.below(4) {
+        let near = 1.0 + [-1.0, 1.0][random.random_range(0..2)] * between(random, 1e-6, 1.0);
+        let radius = match random.random_range(0..4) {
             0 => 0.0,
             1 => distance * between(random, 1e-9, 1.0),
             2 => (line * near).max(0.0),
             _ => distance * near,
         };
-        let k = [1.0, between(random, 1.0, 1e3), between(random, 1.0, 1e12)][random.below(3)];
-        let eps = match random.below(3) {
+        let k = [1.0, between(random, 1.0, 1e3), between(random, 1.0, 1e12)][random.random_range(0..3)];
+        let eps = match random.random_range(0..3) {
             0 => distance / k * 3.0,
             _ => ((distance - radius) / k
-                * (1.0 + [-1.0, 1.0][random.below(2)] * between(random, 1e-6, 1.0)))
+                * (1.0 + [-1.0, 1.0][random.random_range(0..2)] * between(random, 1e-6, 1.0)))
             .max(0.0),
         };
         let axis = direction.cross(to_center).normalize_or(side);
         let radial = (to_center - direction * to_center.dot(direction)).normalize_or(side);
-        let criterion = if random.below(4) == 0 { Criterion::SphereSize } else { Criterion::ScreenError };
+        let criterion =
+            if random.random_ratio(1, 4) { Criterion::SphereSize } else { Criterion::ScreenError };
         Self {
             criterion,
             view: View::from_parts(eye, direction, beta.cos(), beta.sin(), k).unwrap(),
@@ -103,15 +106,17 @@ impl Case {
         }
     }
 
-    fn course(&self, random: &mut Random) -> Course {
-        let rate = |random: &mut Random| if random.below(3) == 0 { 0.0 } else { between(random, 1e-4, 1.0) };
-        let heading = match random.below(6) {
+    fn course(&self, random: &mut Pcg64) -> Course {
+        let rate = |random: &mut Pcg64| {
+            if random.random_ratio(1, 3) { 0.0 } else { between(random, 1e-4, 1.0) }
+        };
+        let heading = match random.random_range(0..6) {
             0 => DVec3::ZERO,
             1 => self.to_center,
             2 => -self.to_center,
             3 => self.inwards,
             4 => -self.inwards,
-            _ => random.direction(),
+            _ => direction(random),
         };
         let rho = if heading == DVec3::ZERO { 0.0 } else { rate(random) * self.distance };
         let (stray, omega) = (rate(random) * self.distance, rate(random));
@@ -154,7 +159,7 @@ impl Case {
 
 #[test]
 fn no_motion_gets_to_a_mark_before_its_bound() {
-    let mut random = Random(41);
+    let mut random = seeded(41);
     let (mut tried, mut reached, mut near_axis) = (0_u64, 0_u64, 0_u64);
     for case in 0..150_000 {
         let node = Case::random(&mut random);
@@ -203,13 +208,13 @@ fn no_motion_gets_to_a_mark_before_its_bound() {
 /// squares is off by 1e-8 of the distance there, which is ten times what a bound gives up.
 #[test]
 fn a_node_near_the_axis_is_where_it_is() {
-    let mut random = Random(42);
+    let mut random = seeded(42);
     for _ in 0..20_000 {
-        let to_center = random.direction();
+        let to_center = direction(&mut random);
         let side = to_center.any_orthonormal_vector();
-        let distance = 1.0 + random.unit();
+        let distance = random.random_range(1.0..2.0);
         let beta = 1e-8_f64;
-        let alpha = 3e-8 * random.unit();
+        let alpha: f64 = random.random_range(0.0..3e-8);
         let direction = (to_center * alpha.cos() + side * alpha.sin()).normalize();
         let view = View::from_parts(-to_center * distance, direction, beta.cos(), beta.sin(), 10.0).unwrap();
         let bounds = Bounds { center: [0.0; 3], radius: 0.0, eps: 1.0 };

@@ -11,11 +11,13 @@ use foldfront::{Bounds, Collapse, CollapseLog, Mesh};
 use glam::DVec3;
 use in_memory::{InMemoryHierarchy, InMemoryTree};
 
-use crate::common::{Random, bumpy_grid};
+use crate::common::{bumpy_grid, direction};
+use rand::RngExt;
+use rand_pcg::Pcg64;
 
 /// Random collapses of a bumpy grid of extent about `2 scale`, with spheres nested as far as their numbers allow: also where
 /// those are subnormal. On flat ground every error is 0.
-pub fn scaled_log(scale: f64, is_flat: bool, random: &mut Random) -> CollapseLog {
+pub fn scaled_log(scale: f64, is_flat: bool, random: &mut Pcg64) -> CollapseLog {
     let grid = bumpy_grid(14, random);
     let scaled = |p: [f32; 3]| p.map(|x| (f64::from(x) * scale) as f32);
     let positions: Vec<[f32; 3]> = grid.positions.iter().map(|&p| scaled(p)).collect();
@@ -24,11 +26,11 @@ pub fn scaled_log(scale: f64, is_flat: bool, random: &mut Random) -> CollapseLog
     let mut live: Vec<u32> = (0..positions.len() as u32).collect();
     let mut collapses = Vec::new();
     while live.len() > 4 {
-        let removed = live.swap_remove(random.below(live.len()));
+        let removed = live.swap_remove(random.random_range(0..live.len()));
         let far = |&&v: &&u32| u64::from(v.abs_diff(removed));
         let kept = *live.iter().min_by_key(far).unwrap();
         let (a, b) = (top[removed as usize], top[kept as usize]);
-        let eps = if is_flat { 0.0 } else { 0.02 * scale * random.unit() * random.unit() };
+        let eps = if is_flat { 0.0 } else { 0.02 * scale * random.random::<f64>() * random.random::<f64>() };
         let bounds = around(&a, &b, eps as f32);
         top[kept as usize] = bounds;
         collapses.push(Collapse { removed, kept, bounds });
@@ -91,9 +93,10 @@ impl Party {
 }
 
 /// A view from around a mesh of extent about `2 scale`, which looks at some point of it through a lens.
-pub fn look(scale: f64, fov_y: f64, theta: f64, random: &mut Random) -> View {
-    let eye = random.direction() * (0.2 + 3.0 * random.unit()) * scale;
-    let target = random.direction() * random.unit() * scale;
-    let camera = Camera::look_at(eye, target, random.direction(), fov_y, 0.5 + random.unit()).unwrap();
+pub fn look(scale: f64, fov_y: f64, theta: f64, random: &mut Pcg64) -> View {
+    let eye = direction(random) * random.random_range(0.2..3.2) * scale;
+    let target = direction(random) * random.random::<f64>() * scale;
+    let camera =
+        Camera::look_at(eye, target, direction(random), fov_y, random.random_range(0.5..1.5)).unwrap();
     View::new(&camera, theta).unwrap()
 }

@@ -9,7 +9,9 @@ use foldfront::selection::view::View;
 use glam::DQuat;
 
 use super::follow::{Party, look, scaled_log};
-use crate::common::Random;
+use crate::common::{direction, seeded};
+use rand::RngExt;
+use rand_pcg::Pcg64;
 
 const SCALES: [f64; 9] = [1e-42, 1e-40, 1e-30, 1e-15, 1.0, 1e9, 1e25, 1e36, 1e37];
 
@@ -19,15 +21,15 @@ fn lenses() -> [f64; 8] {
 }
 
 /// One frame of a walk: at rest, slow, fast, turning by as much as a narrow lens does and by more, elsewhere.
-fn step(view: View, scale: f64, fov_y: f64, theta: f64, random: &mut Random) -> View {
-    let walk = |view: View, length: f64, random: &mut Random| {
-        view.with_eye(view.eye() + random.direction() * random.unit() * length * scale).unwrap()
+fn step(view: View, scale: f64, fov_y: f64, theta: f64, random: &mut Pcg64) -> View {
+    let walk = |view: View, length: f64, random: &mut Pcg64| {
+        view.with_eye(view.eye() + direction(random) * random.random::<f64>() * length * scale).unwrap()
     };
-    let turn = |view: View, angle: f64, random: &mut Random| {
-        let turn = DQuat::from_axis_angle(random.direction(), angle * random.unit());
+    let turn = |view: View, angle: f64, random: &mut Pcg64| {
+        let turn = DQuat::from_axis_angle(direction(random), angle * random.random::<f64>());
         view.with_direction((turn * view.direction()).normalize()).unwrap()
     };
-    match random.below(12) {
+    match random.random_range(0..12) {
         0 => look(scale, fov_y, theta, random),
         1 => view,
         2 => walk(view, 0.5, random),
@@ -39,14 +41,15 @@ fn step(view: View, scale: f64, fov_y: f64, theta: f64, random: &mut Random) -> 
 
 #[test]
 fn of_every_size_through_every_lens() {
-    let mut random = Random(43);
+    let mut random = seeded(43);
     for scale in SCALES {
         let log = scaled_log(scale, false, &mut random);
         let mut changes = 0;
         for fov_y in lenses() {
             for criterion in [Criterion::ScreenError, Criterion::SphereSize] {
                 // At the same size on the image.
-                let theta = 0.01 / (0.5 * fov_y).tan().max(1e-4) * [0.1, 1.0, 10.0][random.below(3)];
+                let theta =
+                    0.01 / (0.5 * fov_y).tan().max(1e-4) * [0.1, 1.0, 10.0][random.random_range(0..3)];
                 let rho = 0.01 * scale;
                 let mut party = Party::new(&log, Settings { criterion, rho, ..Settings::default() });
                 let mut view = look(scale, fov_y, theta, &mut random);
@@ -67,12 +70,12 @@ fn of_every_size_through_every_lens() {
 
 #[test]
 fn elsewhere_in_every_frame() {
-    let mut random = Random(44);
+    let mut random = seeded(44);
     for scale in [1e-42, 1.0, 1e37] {
         let log = scaled_log(scale, false, &mut random);
         let mut party = Party::new(&log, Settings { rho: 0.01 * scale, ..Settings::default() });
         for _ in 0..2000 {
-            let fov_y = lenses()[random.below(8)];
+            let fov_y = lenses()[random.random_range(0..8)];
             party.advance(&[look(scale, fov_y, 0.01, &mut random)], true);
         }
         assert!(party.changes > 20_000, "{} changes", party.changes);
@@ -82,23 +85,23 @@ fn elsewhere_in_every_frame() {
 /// None, one, a few, more than the filter takes; some move and some do not.
 #[test]
 fn views_come_and_go() {
-    let mut random = Random(45);
+    let mut random = seeded(45);
     let log = scaled_log(1.0, false, &mut random);
     let mut party = Party::new(&log, Settings { rho: 0.01, ..Settings::default() });
     let mut views: Vec<View> = Vec::new();
     for _ in 0..6000 {
-        match random.below(20) {
+        match random.random_range(0..20) {
             0 if views.len() < 12 => {
-                let fov_y = lenses()[random.below(8)];
+                let fov_y = lenses()[random.random_range(0..8)];
                 views.push(look(1.0, fov_y, 0.02, &mut random));
             }
-            1 if !views.is_empty() => drop(views.swap_remove(random.below(views.len()))),
-            2 if random.below(8) == 0 => views.clear(),
+            1 if !views.is_empty() => drop(views.swap_remove(random.random_range(0..views.len()))),
+            2 if random.random_ratio(1, 8) => views.clear(),
             3 => views.reverse(),
             _ => {}
         }
         for view in &mut views {
-            if random.below(3) > 0 {
+            if random.random_ratio(2, 3) {
                 *view = step(*view, 1.0, 0.3, 0.02, &mut random);
             }
         }
@@ -110,7 +113,7 @@ fn views_come_and_go() {
 /// Where every error is 0 and the tolerance next to it, and where a budget steers a tolerance that can get no finer.
 #[test]
 fn flat_ground_at_the_finest_tolerance() {
-    let mut random = Random(46);
+    let mut random = seeded(46);
     for is_flat in [true, false] {
         let log = scaled_log(1.0, is_flat, &mut random);
         for criterion in [Criterion::ScreenError, Criterion::SphereSize] {

@@ -12,7 +12,8 @@ use glam::{DQuat, DVec3};
 use in_memory::{InMemoryHierarchy, InMemoryTree};
 
 use super::follow::{Party, look, scaled_log};
-use crate::common::Random;
+use crate::common::{direction, seeded};
+use rand::RngExt;
 
 /// Everything that can be asked of a view with one wrong value.
 fn wrong(view: &View, x: f64) -> [Result<View, ViewError>; 9] {
@@ -37,7 +38,7 @@ fn wrong(view: &View, x: f64) -> [Result<View, ViewError>; 9] {
 /// The application skips such a frame, or shows the one before again.
 #[test]
 fn a_frame_that_is_no_number_changes_nothing() {
-    let mut random = Random(48);
+    let mut random = seeded(48);
     let log = scaled_log(1.0, false, &mut random);
     let mut party = Party::new(&log, Settings { rho: 0.02, ..Settings::default() });
     let mut view = look(1.0, 1.0, 0.02, &mut random);
@@ -45,7 +46,7 @@ fn a_frame_that_is_no_number_changes_nothing() {
     for frame in 0..4000 {
         let next = match frame % 7 {
             3 => {
-                let x = [f64::NAN, f64::INFINITY, f64::NEG_INFINITY][random.below(3)];
+                let x = [f64::NAN, f64::INFINITY, f64::NEG_INFINITY][random.random_range(0..3)];
                 for view in wrong(&view, x) {
                     let error = view.unwrap_err().to_string();
                     assert!(error.contains("NaN") || error.contains("inf"), "{error}");
@@ -53,10 +54,12 @@ fn a_frame_that_is_no_number_changes_nothing() {
                 }
                 view
             }
-            _ if random.below(30) == 0 => look(1.0, 1.0, 0.02, &mut random),
+            _ if random.random_ratio(1, 30) => look(1.0, 1.0, 0.02, &mut random),
             _ => {
-                let turn = DQuat::from_axis_angle(random.direction(), 0.02 * random.unit());
-                let next = view.with_eye(view.eye() + random.direction() * 0.02 * random.unit()).unwrap();
+                let turn = DQuat::from_axis_angle(direction(&mut random), random.random_range(0.0..0.02));
+                let next = view
+                    .with_eye(view.eye() + direction(&mut random) * random.random_range(0.0..0.02))
+                    .unwrap();
                 next.with_direction((turn * view.direction()).normalize()).unwrap()
             }
         };
@@ -72,7 +75,7 @@ fn a_frame_that_is_no_number_changes_nothing() {
 /// in which it does tests everything that is watched, and one in which it does not tests nothing.
 #[test]
 fn no_declared_speed_costs_tests_and_no_cut() {
-    let mut random = Random(49);
+    let mut random = seeded(49);
     let log = scaled_log(1.0, false, &mut random);
     for (rho, omega) in
         [(0.0, 0.02), (0.02, 0.0), (0.0, 0.0), (-1.0, f64::NAN), (f64::INFINITY, f64::INFINITY)]
@@ -90,10 +93,10 @@ fn no_declared_speed_costs_tests_and_no_cut() {
         for frame in 0..600 {
             let before = view;
             if frame % 3 > 0 {
-                view = view.with_eye(view.eye() + random.direction() * 0.01).unwrap();
+                view = view.with_eye(view.eye() + direction(&mut random) * 0.01).unwrap();
             }
             if frame % 5 > 1 {
-                let turn = DQuat::from_axis_angle(random.direction(), 0.01);
+                let turn = DQuat::from_axis_angle(direction(&mut random), 0.01);
                 view = view.with_direction((turn * view.direction()).normalize()).unwrap();
             }
             let (report, all) = (engine.advance(&[view]).unwrap(), all.advance(&[view]).unwrap());
@@ -113,7 +116,7 @@ fn no_declared_speed_costs_tests_and_no_cut() {
 /// What all views would be brought to.
 #[test]
 fn a_tree_that_is_nowhere_is_refused() {
-    let mut random = Random(50);
+    let mut random = seeded(50);
     let mut log = scaled_log(1.0, false, &mut random);
     for x in [f64::NAN, f64::INFINITY, -1e151] {
         log.mesh.georeference.origin = [0.0, x, 0.0];

@@ -153,6 +153,8 @@ fn merge<const N: usize>(
 #[cfg(test)]
 mod tests {
     use super::*;
+    use rand::{RngExt, SeedableRng};
+    use rand_pcg::Pcg64;
 
     /// More runs than are merged at a time, so that groups are merged first.
     #[test]
@@ -160,14 +162,9 @@ mod tests {
         let scratch = Scratch { folder: std::env::temp_dir() };
         for count in [0, 1, 1000, MOST_RUNS as u32 * MOST_RUNS as u32 + 12_345] {
             let mut sorter = Sorter::<2>::new(&scratch, 1);
-            // A full period of a linear congruence: every number once.
-            let mut x = 0_u32;
-            let mut expected = Vec::new();
-            for i in 0..count {
-                x = x.wrapping_mul(1_664_525).wrapping_add(1_013_904_223);
-                sorter.push([x >> 4, i]).unwrap();
-                expected.push([x >> 4, i]);
-            }
+            let mut random = Pcg64::seed_from_u64(1);
+            let mut expected: Vec<[u32; 2]> = (0..count).map(|i| [random.random::<u32>() >> 4, i]).collect();
+            expected.iter().for_each(|&record| sorter.push(record).unwrap());
             expected.sort_unstable();
             let mut expected = expected.iter();
             sorter

@@ -11,9 +11,10 @@ use page_store::source::{Faults, Faulty, MemorySource};
 use vertex_tree::{Hierarchy, NodeId, PageStats, Prefetch, Step, VertexTree};
 
 use super::driver::{Driver, open};
-use super::meshes::Random;
 use super::options;
 use super::paging::built;
+use rand::{RngExt, SeedableRng};
+use rand_pcg::Pcg64;
 
 const FRAME: Duration = Duration::from_millis(10);
 
@@ -86,7 +87,7 @@ fn frame(
 }
 
 /// All nodes, in an order in which they can be unfolded one by one.
-fn order(file: &Arc<XfmFile>, random: &mut Random) -> Vec<NodeId> {
+fn order(file: &Arc<XfmFile>, random: &mut Pcg64) -> Vec<NodeId> {
     let mut driver = Driver::new(file, super::blocking());
     let mut order = Vec::new();
     loop {
@@ -94,7 +95,7 @@ fn order(file: &Arc<XfmFile>, random: &mut Random) -> Vec<NodeId> {
         if boundary.is_empty() {
             return order;
         }
-        let node = boundary[random.below(boundary.len())];
+        let node = boundary[random.random_range(0..boundary.len())];
         // Not where others would have to be forced.
         if driver.tree.unfold(node, &mut driver.mesh).unwrap() == Step::Done {
             driver.active.insert(node);
@@ -109,7 +110,7 @@ fn order(file: &Arc<XfmFile>, random: &mut Random) -> Vec<NodeId> {
 fn what_is_foreseen_is_there_in_time() {
     let (bytes, _) = built(20, &options(2, false, true));
     let file = open(bytes);
-    let order = order(&file, &mut Random(3));
+    let order = order(&file, &mut Pcg64::seed_from_u64(3));
     let run = |prefetch, away: u32, room: u64| {
         let mut driver = Driver::new(&file, Settings { hard_quota: room, ..settings(prefetch, away) });
         let (mut wanted, mut sums) = (BTreeSet::new(), Sums::default());
@@ -219,7 +220,7 @@ fn the_nearest_in_time_keep_their_place() {
 fn peeking_shows_what_unfolding_brings() {
     let (bytes, _) = built(16, &options(2, false, true));
     let file = open(bytes);
-    let order = order(&file, &mut Random(3));
+    let order = order(&file, &mut Pcg64::seed_from_u64(3));
     let mut driver = Driver::new(&file, super::blocking());
     let (mut shown, mut hidden) = (0, 0);
     for &node in &order {
@@ -240,7 +241,7 @@ fn at_rest_loading_ends() {
     let (bytes, _) = built(24, &options(2, false, true));
     let file = open(bytes);
     let all = file.resident_bytes_of_all();
-    let order = order(&file, &mut Random(3));
+    let order = order(&file, &mut Pcg64::seed_from_u64(3));
     let wanted: BTreeSet<NodeId> = order.iter().copied().collect();
     for prefetch in Prefetch::ALL {
         let mut actives = Vec::new();
@@ -282,7 +283,7 @@ fn failed_foresight_is_no_error() {
     }
     assert!(sums.faults > 0 && sums.faults <= roots.len() as u64, "{sums:?}");
     source.set(Faults::default());
-    let wanted = order(&file, &mut Random(1))[..20].iter().copied().collect();
+    let wanted = order(&file, &mut Pcg64::seed_from_u64(1))[..20].iter().copied().collect();
     for _ in 0..20 {
         frame(&mut driver, &wanted, &roots, &mut sums);
     }

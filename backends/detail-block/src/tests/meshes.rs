@@ -3,33 +3,16 @@
 #![expect(clippy::disallowed_methods, reason = "random shapes and motions, or figures to compare with")]
 
 use collapse_log::{Collapse, CollapseLog, Mesh};
+use rand::RngExt;
+use rand_pcg::Pcg64;
 use vertex_tree::Bounds;
 
-/// A small generator with a fixed sequence.
-#[derive(Clone)]
-pub struct Random(pub u64);
-
-impl Random {
-    pub fn next(&mut self) -> u64 {
-        self.0 = self.0.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
-        self.0 >> 11
-    }
-
-    pub fn below(&mut self, limit: usize) -> usize {
-        (self.next() % limit as u64) as usize
-    }
-
-    pub fn unit(&mut self) -> f64 {
-        self.next() as f64 / (1_u64 << 53) as f64
-    }
-}
-
 /// `side * side` vertices, with a boundary.
-pub fn grid(side: usize, random: &mut Random) -> Mesh {
+pub fn grid(side: usize, random: &mut Pcg64) -> Mesh {
     let mut mesh = Mesh::default();
     for y in 0..side {
         for x in 0..side {
-            mesh.positions.push([x as f32, y as f32, random.unit() as f32]);
+            mesh.positions.push([x as f32, y as f32, random.random()]);
         }
     }
     let v = |x: usize, y: usize| (y * side + x) as u32;
@@ -43,7 +26,7 @@ pub fn grid(side: usize, random: &mut Random) -> Mesh {
 }
 
 /// The same joined up at the sides: closed, of genus 1.
-pub fn torus(side: usize, random: &mut Random) -> Mesh {
+pub fn torus(side: usize, random: &mut Pcg64) -> Mesh {
     let mut mesh = grid(side + 1, random);
     let wrap = |v: u32| {
         let (x, y) = (v as usize % (side + 1), v as usize / (side + 1));
@@ -54,7 +37,7 @@ pub fn torus(side: usize, random: &mut Random) -> Mesh {
         .map(|i| {
             let angle = |i: usize| i as f32 / side as f32 * std::f32::consts::TAU;
             let (a, b) = (angle(i % side), angle(i / side));
-            let r = 3.0 + a.cos() + 0.1 * random.unit() as f32;
+            let r = 3.0 + a.cos() + random.random_range(0.0..0.1);
             [r * b.cos(), r * b.sin(), a.sin()]
         })
         .collect();
@@ -62,41 +45,41 @@ pub fn torus(side: usize, random: &mut Random) -> Mesh {
 }
 
 /// A grid with holes, doubled and degenerate triangles, fins, pinched vertices and triangles turned over.
-pub fn rubble(side: usize, random: &mut Random) -> Mesh {
+pub fn rubble(side: usize, random: &mut Pcg64) -> Mesh {
     let mut mesh = grid(side, random);
     let count = mesh.triangles.len();
     for _ in 0..count / 10 {
-        mesh.triangles.swap_remove(random.below(mesh.triangles.len()));
+        mesh.triangles.swap_remove(random.random_range(0..mesh.triangles.len()));
     }
     let vertices = mesh.positions.len();
     for _ in 0..count / 20 {
-        let t = mesh.triangles[random.below(mesh.triangles.len())];
+        let t = mesh.triangles[random.random_range(0..mesh.triangles.len())];
         let [a, b, c] = t;
-        let other = random.below(vertices) as u32;
-        let added = match random.below(5) {
+        let other = random.random_range(0..vertices as u32);
+        let added = match random.random_range(0..5) {
             0 => t,
             1 => [c, b, a],
             2 => [a, b, other],
             3 => [a, a, b],
-            _ => [a, other, random.below(vertices) as u32],
+            _ => [a, other, random.random_range(0..vertices as u32)],
         };
         mesh.triangles.push(added);
     }
     for _ in 0..count / 40 {
-        let t = random.below(mesh.triangles.len());
+        let t = random.random_range(0..mesh.triangles.len());
         mesh.triangles[t].swap(0, 1);
     }
     mesh
 }
 
 /// A log of collapses along random edges of what is left, whether they are any good or not.
-pub fn random_log(mesh: Mesh, random: &mut Random) -> CollapseLog {
+pub fn random_log(mesh: Mesh, random: &mut Pcg64) -> CollapseLog {
     let count = mesh.positions.len();
     let mut at: Vec<u32> = (0..count as u32).collect();
     let mut collapses = Vec::new();
     for round in 0..4 * count {
-        let t = mesh.triangles[random.below(mesh.triangles.len())];
-        let i = random.below(3);
+        let t = mesh.triangles[random.random_range(0..mesh.triangles.len())];
+        let i = random.random_range(0..3);
         let [mut removed, mut kept] = [t[i], t[(i + 1) % 3]];
         for v in [&mut removed, &mut kept] {
             while at[*v as usize] != *v {

@@ -10,11 +10,13 @@ use page_store::source::{Faults, Faulty, MemorySource};
 use vertex_tree::{Hierarchy, NodeId};
 
 use super::driver::{Driver, bytes_of, open};
-use super::meshes::{Random, random_log, torus};
+use super::meshes::{random_log, torus};
 use super::{blocking, options};
+use rand::{RngExt, SeedableRng};
+use rand_pcg::Pcg64;
 
 pub fn built(side: usize, options: &BuildOptions) -> (Vec<u8>, CollapseLog) {
-    let mut random = Random(11);
+    let mut random = Pcg64::seed_from_u64(11);
     let log = random_log(torus(side, &mut random), &mut random);
     let arrangement = Arrangement::new(&log, options).unwrap();
     (bytes_of(&arrangement), arrangement.effective_log())
@@ -31,17 +33,17 @@ fn kinds() -> [Io; 3] {
 }
 
 /// One frame of random changes, more down than up or the reverse; `check` sees the driver after every step.
-fn frame(driver: &mut Driver, random: &mut Random, down: usize, check: &dyn Fn(&Driver)) {
+fn frame(driver: &mut Driver, random: &mut Pcg64, down: usize, check: &dyn Fn(&Driver)) {
     let mut arrived = Vec::new();
     driver.tree.begin_frame(&mut arrived).unwrap();
     for _ in 0..12 {
         let boundary = driver.boundary();
         let collapsible: Vec<NodeId> =
             driver.active.iter().copied().filter(|&n| driver.is_collapsible(n)).collect();
-        if random.below(10) < down && !boundary.is_empty() {
-            driver.unfold(boundary[random.below(boundary.len())]).unwrap();
+        if random.random_range(0..10) < down && !boundary.is_empty() {
+            driver.unfold(boundary[random.random_range(0..boundary.len())]).unwrap();
         } else if !collapsible.is_empty() {
-            driver.fold(collapsible[random.below(collapsible.len())]).unwrap();
+            driver.fold(collapsible[random.random_range(0..collapsible.len())]).unwrap();
         }
         check(driver);
     }
@@ -58,7 +60,7 @@ fn the_hard_quota_is_never_exceeded() {
     let all = file.resident_bytes_of_all();
     for io in kinds() {
         let mut driver = Driver::new(&file, reading(io));
-        let mut random = Random(17);
+        let mut random = Pcg64::seed_from_u64(17);
         let mut hard = all / 4;
         driver.tree.set_quotas(all / 6, hard);
         for round in 0..400 {
@@ -93,7 +95,7 @@ fn the_hard_quota_is_never_exceeded() {
 fn a_hard_quota_lowered_below_the_front_takes_effect_as_it_folds() {
     let (bytes, _) = built(16, &options(3, false, true));
     let mut driver = Driver::new(&open(bytes), blocking());
-    let mut random = Random(2);
+    let mut random = Pcg64::seed_from_u64(2);
     super::unfold_all(&mut driver, &mut random);
     let hard = driver.tree.block_bytes().0 / 3;
     driver.tree.set_quotas(hard, hard);
@@ -108,7 +110,7 @@ fn a_hard_quota_lowered_below_the_front_takes_effect_as_it_folds() {
 fn without_a_quota_to_keep_anything_nothing_is_kept() {
     let (bytes, _) = built(12, &BuildOptions::default());
     let mut driver = Driver::new(&open(bytes), blocking());
-    super::unfold_all(&mut driver, &mut Random(2));
+    super::unfold_all(&mut driver, &mut Pcg64::seed_from_u64(2));
     driver.tree.set_quotas(0, u64::MAX);
     super::fold_all(&mut driver);
     for _ in 0..3 {
@@ -134,14 +136,14 @@ fn faults_cost_nothing_but_time() {
         source.set(faults);
         let mut driver = Driver::new(&file, reading(io));
         driver.tree.set_quotas(file.resident_bytes_of_all() / 10, u64::MAX);
-        let mut random = Random(seed);
+        let mut random = Pcg64::seed_from_u64(seed);
         let mut counted = 0;
         for round in 0..900 {
             driver.tree.begin_frame(&mut Vec::new()).unwrap();
             for _ in 0..8 {
                 let boundary = driver.boundary();
-                if random.below(10) < [9, 4][round / 40 % 2] && !boundary.is_empty() {
-                    driver.unfold(boundary[random.below(boundary.len())]).unwrap();
+                if random.random_range(0..10) < [9, 4][round / 40 % 2] && !boundary.is_empty() {
+                    driver.unfold(boundary[random.random_range(0..boundary.len())]).unwrap();
                 } else if let Some(&node) = driver.active.iter().rev().find(|&&n| driver.is_collapsible(n)) {
                     driver.fold(node).unwrap();
                 }
@@ -208,7 +210,7 @@ fn a_grace_keeps_what_has_just_been_used() {
     let (bytes, _) = built(12, &BuildOptions::default());
     let file = open(bytes);
     let mut driver = Driver::new(&file, Settings { grace: 20, ..blocking() });
-    super::unfold_all(&mut driver, &mut Random(2));
+    super::unfold_all(&mut driver, &mut Pcg64::seed_from_u64(2));
     super::fold_all(&mut driver);
     driver.tree.set_quotas(0, u64::MAX);
     for frame in 1..=30 {
@@ -217,7 +219,7 @@ fn a_grace_keeps_what_has_just_been_used() {
         assert_eq!(driver.tree.block_bytes().0 == 0, frame > 20, "frame {frame}");
     }
     let mut driver = Driver::new(&file, Settings { grace: 20, ..blocking() });
-    super::unfold_all(&mut driver, &mut Random(2));
+    super::unfold_all(&mut driver, &mut Pcg64::seed_from_u64(2));
     super::fold_all(&mut driver);
     driver.tree.set_quotas(0, 0);
     driver.tree.begin_frame(&mut Vec::new()).unwrap();

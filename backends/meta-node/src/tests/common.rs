@@ -7,27 +7,24 @@ use std::sync::Arc;
 use crate::{BuildOptions, MetaNodeError, MetaNodeFile, MetaNodeTree};
 use collapse_log::{Collapse, CollapseLog, Mesh};
 use page_store::source::MemorySource;
+use rand::{RngExt, SeedableRng};
+use rand_pcg::Pcg64;
 use vertex_tree::{Bounds, Hierarchy, NodeId, NullSink, Step, VertexTree};
-
-/// A small generator with a fixed sequence.
-pub struct Random(pub u64);
-
-impl Random {
-    pub fn below(&mut self, limit: usize) -> usize {
-        self.0 = self.0.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
-        ((self.0 >> 33) % limit as u64) as usize
-    }
-}
 
 /// A grid of `side * side` vertices, simplified at random to `left` vertices: spheres and errors are nested, and nothing
 /// else is good about it.
 pub fn random_log(side: usize, left: usize, seed: u64) -> CollapseLog {
-    let mut random = Random(seed);
+    let mut random = Pcg64::seed_from_u64(seed);
+    log_of(side, left, |limit| random.random_range(0..limit))
+}
+
+/// The same of any numbers below a limit.
+pub fn log_of(side: usize, left: usize, mut below: impl FnMut(usize) -> usize) -> CollapseLog {
     let mut mesh = Mesh::default();
     let v = |x: usize, y: usize| (y * side + x) as u32;
     for y in 0..side {
         for x in 0..side {
-            mesh.positions.push([x as f32, y as f32, random.below(100) as f32 / 100.0]);
+            mesh.positions.push([x as f32, y as f32, below(100) as f32 / 100.0]);
         }
     }
     for y in 1..side {
@@ -41,13 +38,12 @@ pub fn random_log(side: usize, left: usize, seed: u64) -> CollapseLog {
     let mut live: Vec<u32> = (0..mesh.positions.len() as u32).collect();
     let mut collapses = Vec::new();
     while live.len() > left {
-        let removed = live.swap_remove(random.below(live.len()));
+        let removed = live.swap_remove(below(live.len()));
         // Near in number is often near in space.
-        let kept =
-            *live.iter().min_by_key(|&&v| v.abs_diff(removed) as usize * 4 + random.below(64)).unwrap();
+        let kept = *live.iter().min_by_key(|&&v| v.abs_diff(removed) as usize * 4 + below(64)).unwrap();
         let (a, b) = (top[removed as usize], top[kept as usize]);
         let distance = (0..3).map(|i| (a.center[i] - b.center[i]).powi(2)).sum::<f32>().sqrt();
-        let eps = a.eps.max(b.eps) + random.below(10) as f32;
+        let eps = a.eps.max(b.eps) + below(10) as f32;
         let bounds = Bounds { center: b.center, radius: (b.radius.max(distance + a.radius)) * 1.001, eps };
         top[kept as usize] = bounds;
         collapses.push(Collapse { removed, kept, bounds });

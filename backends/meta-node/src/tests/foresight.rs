@@ -13,7 +13,7 @@ const MS: Duration = Duration::from_millis(1);
 
 fn file() -> Arc<MetaNodeFile> {
     let options = BuildOptions { levels: Some(3), page_bytes: 700 };
-    let bytes = bytes(&random_log(60, 3, 11), &options);
+    let bytes = bytes(&random_log(60, 3, 12), &options);
     Arc::new(MetaNodeFile::open(Arc::new(MemorySource::new("tree", bytes))).unwrap())
 }
 

@@ -4,9 +4,11 @@ use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::{Duration, Instant};
 
-use crate::tests::common::{Front, Random, bytes, frame, holder_bytes, random_log};
+use crate::tests::common::{Front, bytes, frame, holder_bytes, random_log};
 use crate::{BuildOptions, InUse, MetaNodeError, MetaNodeFile, MetaNodeTree, Settings};
 use page_store::source::{Faults, Faulty, MemorySource, PageSource, Throttled};
+use rand::{RngExt, SeedableRng};
+use rand_pcg::Pcg64;
 use vertex_tree::{Hierarchy, NullSink, VertexTree};
 
 const PAGES: BuildOptions = BuildOptions { levels: Some(3), page_bytes: 700 };
@@ -94,17 +96,17 @@ fn memory_may_change_between_frames() {
     let mut tree = MetaNodeTree::new(file, Settings::default()).unwrap();
     tree.load_all();
     let mut front = Front::new(&tree);
-    let mut random = Random(5);
+    let mut random = Pcg64::seed_from_u64(5);
     for round in 0..60 {
-        let holders = if round % 7 == 0 { 10_000 } else { 4 + random.below(40) as u64 };
+        let holders = if round % 7 == 0 { 10_000 } else { random.random_range(4..44) };
         tree.set_page_memory(holders * each).unwrap();
-        for _ in 0..random.below(30) {
+        for _ in 0..random.random_range(0..30) {
             let (_, stats) = frame(&mut tree, |tree| match round % 3 {
                 0 => drop(front.fold(tree)),
                 _ => drop(front.unfold(tree)),
             });
             assert!(stats.resident_bytes <= holders * each, "{stats:?}, {holders} place holders allowed");
-            if random.below(2) == 0 {
+            if random.random() {
                 tree.settle().unwrap();
             }
         }
