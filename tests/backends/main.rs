@@ -22,4 +22,5 @@ mod conforming;
 mod detail_block;
 mod meta_node;
 mod mt_partition;
+mod page_store;
 mod slow_store;

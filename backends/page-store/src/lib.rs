@@ -26,9 +26,6 @@ pub mod source;
 mod store;
 mod sync;
 
-#[cfg(test)]
-mod tests;
-
 pub use failures::Failures;
 pub use pages::Pages;
 pub use queue::NOW;

@@ -1,9 +1,10 @@
-//! Requests on a store that has its own time: in order of urgency, so many under way, and the same every time.
+//! The page store on time of its own, as its own tests under the model checker can not have it: requests in order of
+//! urgency, so many under way, and the same every time.
 
 use std::sync::Arc;
 use std::time::Duration;
 
-use crate::{Arrival, NOW, Pages, Requests, Simulated, Store};
+use foldfront::page_store::{Arrival, NOW, Pages, Requests, Simulated, Store};
 
 const MS: Duration = Duration::from_millis(1);
 

@@ -1,3 +1,0 @@
-//! What the crate does as others see it.
-
-mod virtual_time;
