@@ -3,6 +3,7 @@
 mod backends;
 mod commands;
 mod comparison;
+mod crashes;
 mod damage;
 mod destinations;
 mod examples;
