@@ -10,6 +10,7 @@
 //! * on virtual time at 60 frames a second, with a store of 5 ms and as much memory as the settled replay with partitions
 //!   of 20 took: misses, reads and bytes.
 
+use std::ops::ControlFlow;
 use std::path::Path;
 use std::time::Duration;
 
@@ -148,7 +149,10 @@ fn replay(
     let settings = Settings { rho: 0.05, omega: 0.02, ..Settings::default() };
     let mut reports = Vec::new();
     let frame = store.map(|_| FRAME);
-    let replayed = scene.replay(views, settings, &paging, frame, |_, _, report| reports.push(report));
+    let replayed = scene.replay(views, settings, &paging, frame, |_, _, report| {
+        reports.push(report);
+        ControlFlow::Continue(())
+    });
     replayed.expect("files that are whole");
     reports
 }

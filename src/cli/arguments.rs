@@ -52,7 +52,7 @@ pub(super) enum Command {
 pub(super) struct Build {
     /// Mesh files (.obj .ply .stl .off), heights (.hgt or .zip of them, several are one mosaic; .png .tif), or scene:NAME.
     #[arg(required = true)]
-    pub input: Vec<String>,
+    pub input: Vec<PathBuf>,
     /// How the hierarchy will be stored.
     #[arg(long, default_value = "in-memory", value_parser = backend)]
     pub backend: Backend,
@@ -172,7 +172,7 @@ impl Refinement {
 pub(super) struct Compare {
     /// Meshes, hierarchy files, .scene files (several objects, a file and a matrix a line) and scene:NAME; by default the
     /// three built-in scenes. Tiles (.hgt) are one mosaic.
-    pub input: Vec<String>,
+    pub input: Vec<PathBuf>,
     /// Walkthroughs to replay; by default those recorded for a built-in scene, and a flight around anything else.
     #[arg(long)]
     pub path: Vec<PathBuf>,
@@ -313,7 +313,7 @@ pub(super) enum PathSubcommand {
         trajectory: PathBuf,
         /// The mesh or scene or hierarchy that the path is for.
         #[arg(long, required = true, num_args = 1..)]
-        fit: Vec<String>,
+        fit: Vec<PathBuf>,
         /// The path file to write.
         #[arg(short, long)]
         output: PathBuf,
@@ -355,7 +355,7 @@ impl From<ImportMode> for import::Mode {
 pub(super) struct FrameOf {
     /// A hierarchy file, a mesh, or scene:NAME.
     #[arg(required = true)]
-    pub file: Vec<String>,
+    pub file: Vec<PathBuf>,
     /// The walkthrough.
     #[arg(long)]
     pub path: PathBuf,
@@ -397,10 +397,10 @@ pub(super) struct Render {
 pub(super) struct Deviation {
     /// A hierarchy file, a mesh, or scene:NAME.
     #[arg(required = true)]
-    pub file: Vec<String>,
+    pub file: Vec<PathBuf>,
     /// The original to measure against; by default the input that the hierarchy holds.
     #[arg(long)]
-    pub against: Vec<String>,
+    pub against: Vec<PathBuf>,
     /// The walkthrough.
     #[arg(long)]
     pub path: PathBuf,

@@ -2,6 +2,7 @@
 
 use std::ops::Range;
 use std::path::Path as FilePath;
+use std::sync::atomic::Ordering;
 
 use anyhow::{Context, Result, bail};
 use collapse_log::Mesh;
@@ -9,6 +10,7 @@ use collapse_log::Mesh;
 use super::arguments::Compare;
 use super::destination::check_folder;
 use super::input::{Input, Replayable};
+use super::interrupt;
 use super::progress::stage;
 use super::say::{Misunderstood, print};
 use crate::experiment::compare::{Options, Paging, Run, Subject, csv, replay_scene};
@@ -46,10 +48,19 @@ pub(super) fn compare(command: &Compare) -> Result<()> {
     };
     check_folder(&command.out, is_written, &files)?;
 
-    let arguments: Vec<String> = std::env::args().skip(1).collect();
+    // A name that is no text is shown with replacements.
+    let arguments: Vec<String> =
+        std::env::args_os().skip(1).map(|argument| argument.to_string_lossy().into_owned()).collect();
     let made_by = format!("foldfront {}", arguments.join(" "));
     let mut report = Report { command: made_by, pace: options.pace, sections: Vec::new() };
     for (input, name) in inputs.iter().zip(unique_names(&inputs)) {
+        // What has been finished is to be written: then an interrupt waits for what goes on.
+        if options.stop.is_some_and(|stop| stop.load(Ordering::Relaxed)) {
+            break;
+        }
+        if report.sections.is_empty() {
+            interrupt::end_at_once();
+        }
         if let Input::Objects(file) = input {
             report.sections.push(objects(command, file, &name, &paths, &options)?);
             continue;
@@ -57,6 +68,7 @@ pub(super) fn compare(command: &Compare) -> Result<()> {
         let storage = BuildOptions::from(&command.storage);
         let subjects = input.replayable(&name, &command.backend, &storage, command.merge_components)?;
         let walks = walks(input, &subjects, &paths)?;
+        interrupt::end_well();
         let is_alone = subjects.len() == 1;
         for subject in subjects {
             let name = match subject.subject.backend() {
@@ -66,23 +78,45 @@ pub(super) fn compare(command: &Compare) -> Result<()> {
             report.sections.push(section(command, name, subject, &walks, &options)?);
         }
     }
+    report.sections.retain(|section| !section.runs.is_empty());
+    if report.sections.is_empty() {
+        bail!("interrupted before a replay was finished");
+    }
     let file = command.out.join("report.html");
-    let mut pages = vec![(file.clone(), report.to_html()?)];
+    let runs: Vec<&Run> = report.sections.iter().flat_map(|section| &section.runs).collect();
+    let at = |name: &str| command.out.join(name);
+    let mut files = vec![
+        (at("frames.csv"), csv::frames(&runs)),
+        (at("summary.csv"), csv::summary(&runs)),
+        (file.clone(), report.to_html()?.into_bytes()),
+    ];
     for section in &report.sections {
-        pages.push((
-            command.out.join(format!("selection-{}.svg", section.name)),
-            section.curves(&report.command)?,
-        ));
+        let curves = section.curves(&report.command)?;
+        files.push((at(&format!("selection-{}.svg", section.name)), curves.into_bytes()));
     }
     // Only now, so that a failure leaves what is there as it is.
     std::fs::create_dir_all(&command.out).with_context(|| command.out.display().to_string())?;
-    let runs: Vec<&Run> = report.sections.iter().flat_map(|section| &section.runs).collect();
-    csv::write_frames(&command.out.join("frames.csv"), &runs)?;
-    csv::write_summary(&command.out.join("summary.csv"), &runs)?;
-    for (file, text) in &pages {
-        write(file, text)?;
+    let written = output::write_all(files.iter().map(|(file, bytes)| (&**file, &**bytes)));
+    written.map_err(|(file, error)| anyhow::Error::new(error).context(file.display().to_string()))?;
+    print(&format!("{}\nThe report is in {}\n", report.to_text(), file.display()))?;
+    if options.stop.is_some_and(|stop| stop.load(Ordering::Relaxed)) {
+        bail!("interrupted: {} has what had been replayed to the end", command.out.display());
     }
-    print(&format!("{}\nThe report is in {}\n", report.to_text(), file.display()))
+    match faults(runs) {
+        None => Ok(()),
+        Some(faults) => bail!("{faults}"),
+    }
+}
+
+/// How many faults there were in some runs, if any, and the first.
+fn faults<'a>(runs: impl IntoIterator<Item = &'a Run>) -> Option<String> {
+    let (mut count, mut first) = (0, None);
+    for run in runs {
+        count += run.rows.iter().map(|row| row.report.pages.faults).sum::<u64>();
+        first = first.or(run.fault.as_ref());
+    }
+    let more = count.saturating_sub(1);
+    first.map(|first| format!("{first}; {more} more such faults, and what they keep back was not displayed"))
 }
 
 /// Before any work: whether all backends have the ways to load that are asked for.
@@ -131,15 +165,24 @@ fn section(
         let frames = frames_of(command, walk)?;
         let label = format!("{name}: {}, {} frames", walk.name, frames.len());
         let replayed = stage(&label, |p| subject.replay(walk, frames, options, p))?;
+        if replayed.is_empty() {
+            break;
+        }
         // One backend shows what the others do.
         if subject.backend() == command.backend.first().copied().unwrap_or(subject.backend()) {
             let frame = most_complex(&replayed[0]);
-            pictures.extend(stage(&format!("{name}: pictures"), |_| draw(&subject, walk, frame, options))?);
+            match stage(&format!("{name}: pictures"), |_| draw(&subject, walk, frame, options)) {
+                Ok(drawn) => pictures.extend(drawn),
+                // The frames are there, and say so; a picture of what is damaged could not.
+                Err(_) if faults(&replayed).is_some() => {}
+                Err(error) => return Err(error),
+            }
         }
         runs.extend(replayed);
     }
     let mut facts = facts(log.as_ref().map(|log| &log.mesh), built.as_ref());
     facts.extend(stored);
+    facts.extend(faults(&runs).map(|faults| ("faults", faults)));
     Ok(Section {
         name,
         scene: subject.name().to_owned(),
@@ -171,6 +214,7 @@ fn objects(
     let mut options_of_meshes = simplify::Options::default();
     options_of_meshes.merge_components = command.merge_components;
     let scene = stage(&format!("{name}: opening"), |_| StoredScene::open_with(file, &options_of_meshes))?;
+    interrupt::end_well();
     for object in scene.objects() {
         let own = scene.files()[object.file].backend();
         if let Some(other) = command.backend.iter().find(|&&backend| backend != own) {
@@ -189,11 +233,12 @@ fn objects(
         let label = format!("{name}: {}, {} frames", walk.name, frames.len());
         section.runs.extend(stage(&label, |p| replay_scene(name, &scene, walk, frames, options, p))?);
     }
-    section.facts = vec![
+    section.facts.extend(faults(&section.runs).map(|faults| ("faults", faults)));
+    section.facts.extend([
         ("objects", scene.objects().len().to_string()),
         ("files", scene.files().len().to_string()),
         ("least memory", format!("{} bytes", scene.least_memory())),
-    ];
+    ]);
     Ok(section)
 }
 
@@ -263,10 +308,6 @@ fn unique_names(inputs: &[Input]) -> Vec<String> {
     names
 }
 
-fn write(file: &FilePath, text: &str) -> Result<()> {
-    output::write(file, text.as_bytes()).with_context(|| file.display().to_string())
-}
-
 fn options(command: &Compare) -> Options {
     let budget = match (command.triangles, command.frame_time) {
         (Some(most), _) => Budget::Displayed(most),
@@ -293,5 +334,6 @@ fn options(command: &Compare) -> Options {
         },
         prefetch: command.prefetch.clone(),
         pace: command.pace(),
+        stop: Some(interrupt::flag()),
     }
 }

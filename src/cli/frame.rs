@@ -1,6 +1,7 @@
 //! `export`, `render` and `deviation`: one frame of anything.
 
 use std::fmt::Write;
+use std::path::PathBuf;
 
 use anyhow::{Context, Result, bail};
 use collapse_log::Mesh;
@@ -34,7 +35,7 @@ fn check_frame(path: &Path, frame: usize) -> Result<()> {
 }
 
 /// The one thing that the arguments name.
-fn subject(arguments: &[String]) -> Result<Replayable> {
+fn subject(arguments: &[PathBuf]) -> Result<Replayable> {
     let input = Input::one(arguments)?;
     let mut all = input.replayable(&input.name(), &[], &BuildOptions::default(), false)?;
     all.pop().context("one backend is one subject")

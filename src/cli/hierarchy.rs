@@ -2,16 +2,17 @@
 
 use std::fmt::Write;
 use std::path::{Path, PathBuf};
-use std::sync::atomic::{AtomicBool, Ordering};
 
 use anyhow::{Context, Result};
 use collapse_log::{CollapseLog, LogFile, Mesh, log_file_version, read_log};
+use container::temporary::Temporary;
 use container::{DegreeMap, Georeference};
 use serde_json::json;
 
 use super::arguments::{Build, Info, Verify};
 use super::destination::{Content, check_file};
 use super::input::Input;
+use super::interrupt;
 use super::progress::stage;
 use super::say::{print, warn};
 use crate::experiment::store::{self, Backend, BuildOptions, Store, WriteLimits};
@@ -27,7 +28,7 @@ pub(super) fn build(command: &Build) -> Result<()> {
             Input::Meshes(files) => tell(&build_within(&input.name(), files, memory, command)?),
             Input::Log(file) => {
                 let log = LogFile::open(file)?;
-                let limits = write_limits(memory, command)?;
+                let limits = write_limits(memory, command);
                 write_within(&input.name(), &log, command, &limits)
             }
             Input::Scene(scene) => anyhow::bail!("--memory builds from files, and {scene} is made in memory"),
@@ -46,20 +47,13 @@ pub(super) fn build(command: &Build) -> Result<()> {
 }
 
 /// What `--memory` allows. From now on an interrupt is an error like any other.
-fn write_limits(memory: u64, command: &Build) -> Result<WriteLimits<'static>> {
-    static STOP: AtomicBool = AtomicBool::new(false);
-    // Whoever does not want to wait for the temporary files to go asks twice.
-    ctrlc::set_handler(|| {
-        if STOP.swap(true, Ordering::Relaxed) {
-            std::process::exit(130);
-        }
-    })?;
+fn write_limits(memory: u64, command: &Build) -> WriteLimits<'static> {
     let temporary = match (&command.temp, command.output.parent()) {
         (Some(folder), _) => folder.clone(),
         (None, Some(parent)) if !parent.as_os_str().is_empty() => parent.to_owned(),
         _ => PathBuf::from("."),
     };
-    Ok(WriteLimits { memory, temporary, stop: &STOP })
+    WriteLimits { memory, temporary, stop: interrupt::end_well() }
 }
 
 /// Writes the hierarchy of a log that may be larger than memory.
@@ -73,7 +67,7 @@ fn write_within(name: &str, log: &LogFile, command: &Build, limits: &WriteLimits
 
 /// Builds the hierarchy of a mesh that may be larger than memory.
 fn build_within(name: &str, files: &[PathBuf], memory: u64, command: &Build) -> Result<simplify::Report> {
-    let limits = write_limits(memory, command)?;
+    let limits = write_limits(memory, command);
     let expected_triangles = mesh_io::expected_triangles(files);
     let folder = &limits.temporary;
     let mut options = simplify::Options::default();
@@ -99,8 +93,9 @@ fn build_within(name: &str, files: &[PathBuf], memory: u64, command: &Build) -> 
         return Ok(build(&command.output)?);
     }
     // The backend's file is written from the log, which nobody has asked for.
-    let log = tempfile::Builder::new().prefix(".foldfront-").tempfile_in(folder);
-    let log = log.with_context(|| format!("temporary files in {}", folder.display()))?.into_temp_path();
+    let own_folder = Temporary::new_in(folder);
+    let own_folder = own_folder.with_context(|| format!("temporary files in {}", folder.display()))?;
+    let log = own_folder.file("log");
     let report = build(&log)?;
     write_within(name, &LogFile::open(&log)?, command, &limits)?;
     Ok(report)
@@ -177,7 +172,7 @@ fn describe(report: &simplify::Report) -> String {
 }
 
 pub(super) fn info(command: &Info) -> Result<()> {
-    if let Input::Stored(file) = Input::one(&[command.file.display().to_string()])? {
+    if let Input::Stored(file) = Input::one(std::slice::from_ref(&command.file))? {
         let store = Store::open(&file)?;
         warn_of_rounding(&store.georeference());
         let facts = store.facts();
@@ -267,7 +262,7 @@ fn base_triangles(log: &CollapseLog) -> usize {
 
 /// Everything that reading checks, and that bounds are nested: what the criterion relies on.
 pub(super) fn verify(command: &Verify) -> Result<()> {
-    if let Input::Stored(file) = Input::one(&[command.file.display().to_string()])? {
+    if let Input::Stored(file) = Input::one(std::slice::from_ref(&command.file))? {
         let store = Store::open(&file)?;
         stage(&format!("{}: verifying", file.display()), |_| store.verify())?;
         return print(&format!("{}: every page of {} is in order\n", file.display(), store.backend().name()));

@@ -7,6 +7,7 @@ use std::time::{Duration, Instant};
 
 use anyhow::{Context, Result, bail};
 use collapse_log::{CollapseLog, Mesh};
+use container::temporary::Temporary;
 
 use super::progress::stage;
 use crate::experiment::compare::Subject;
@@ -32,15 +33,15 @@ pub(super) enum Input {
 
 impl Input {
     /// Sorts arguments into inputs, in order. All height tiles together are one mosaic.
-    pub fn all(arguments: &[String]) -> Result<Vec<Self>> {
+    pub fn all(arguments: &[PathBuf]) -> Result<Vec<Self>> {
         let mut inputs = Vec::new();
         let mut tiles: Option<usize> = None;
         for argument in arguments {
-            if argument.starts_with("scene:") {
-                inputs.push(Self::Scene(Scene::parse(argument)?));
+            if let Some(scene) = argument.to_str().filter(|name| name.starts_with("scene:")) {
+                inputs.push(Self::Scene(Scene::parse(scene)?));
                 continue;
             }
-            let path = PathBuf::from(argument);
+            let path = argument.clone();
             if path.extension().is_some_and(|e| e.eq_ignore_ascii_case("scene")) {
                 inputs.push(Self::Objects(path));
                 continue;
@@ -69,11 +70,14 @@ impl Input {
     }
 
     /// The one input that the arguments name.
-    pub fn one(arguments: &[String]) -> Result<Self> {
+    pub fn one(arguments: &[PathBuf]) -> Result<Self> {
         let mut inputs = Self::all(arguments)?;
         match (inputs.pop(), inputs.is_empty()) {
             (Some(input), true) => Ok(input),
-            _ => bail!("one input is expected, not {}", arguments.join(" ")),
+            _ => {
+                let all: Vec<_> = arguments.iter().map(|argument| argument.to_string_lossy()).collect();
+                bail!("one input is expected, not {}", all.join(" "))
+            }
         }
     }
 
@@ -191,7 +195,7 @@ pub(super) struct Replayable {
     /// What writing its file took, where it has been written for this.
     pub writing: Option<Duration>,
     /// The folder of its file, where it has been written for this: to be kept as long as the subject.
-    pub folder: Option<tempfile::TempDir>,
+    pub folder: Option<Temporary>,
 }
 
 impl Input {
@@ -231,8 +235,8 @@ impl Input {
             // A log by itself need not be written to be replayed, only to be compared.
             let (mut store, mut folder, mut file_bytes, mut writing) = (None, None, None, None);
             if backends.len() > 1 || backend != Backend::InMemory {
-                let temporary = tempfile::tempdir()?;
-                let file = temporary.path().join("hierarchy");
+                let temporary = Temporary::new()?;
+                let file = temporary.file("hierarchy");
                 let start = Instant::now();
                 stage(&format!("{name}: writing for {}", backend.name()), |_| {
                     store::write(backend, &file, &log, options)

@@ -3,7 +3,7 @@
 //! It may use every other room. What must never be in it: anything that a user of the library would miss.
 //!
 //! Errors are one line on standard error that starts with `foldfront: `. Exit code 1 says that something failed, 2
-//! that the command was not understood. A command that fails leaves the files that it would have written as they
+//! that the command was not understood, 130 that it was interrupted. A command that fails leaves the files that it would have written as they
 //! were.
 
 mod arguments;
@@ -12,12 +12,15 @@ mod destination;
 mod frame;
 mod hierarchy;
 mod input;
+mod interrupt;
 mod path;
 mod progress;
 mod say;
+mod threads;
 mod values;
 
 use std::process::ExitCode;
+use std::sync::atomic::Ordering;
 
 use clap::Parser;
 use clap::error::ErrorKind;
@@ -44,6 +47,8 @@ pub fn main() -> ExitCode {
             return ExitCode::from(2);
         }
     };
+    interrupt::listen();
+    threads::take_what_there_is();
     let result = match arguments.command {
         Command::Build(command) => hierarchy::build(&command),
         Command::Info(command) => hierarchy::info(&command),
@@ -62,6 +67,9 @@ pub fn main() -> ExitCode {
                 return ExitCode::SUCCESS;
             }
             complain(&failure_line(&error));
+            if interrupt::flag().load(Ordering::Relaxed) {
+                return ExitCode::from(interrupt::EXIT_CODE);
+            }
             if error.is::<Misunderstood>() { ExitCode::from(2) } else { ExitCode::FAILURE }
         }
     }

@@ -55,7 +55,7 @@ use selection::engine::{Engine, Settings};
 use selection::refine::Strategy;
 use selection::settled::Settled;
 use selection::view::View;
-use testing::brute_force::{BruteForce, unfold_all};
+use testing::brute_force::{BruteForce, unfold_all, unfold_what_can_be};
 use testing::oracle::Oracle;
 
 /// A hierarchy with what is needed to replay paths through it.
@@ -150,6 +150,7 @@ impl Subject {
     /// The displayed mesh of one frame.
     ///
     /// # Errors
+    /// A fault that keeps a node back is one: what is damaged is not displayed without a word.
     /// [`CompareError::View`], [`CompareError::Store`], [`CompareError::Tree`].
     pub fn frame(&self, path: &Path, frame: usize, options: &Options) -> Result<Mesh, CompareError> {
         let strategy = Strategy::TopDown;
@@ -158,7 +159,12 @@ impl Subject {
         let view = options.view(path, frame)?;
         let tree = self.tree(&Opening { paging: options.paging, ..Opening::SETTLED })?;
         let mut engine = Engine::new(tree, ActiveMesh::new(), settings).map_err(|e| self.tree_error(e))?;
-        engine.advance(&[view]).map_err(|e| self.tree_error(e))?;
+        let report = engine.advance(&[view]).map_err(|e| self.tree_error(e))?;
+        if report.misses > 0
+            && let Some(fault) = engine.take_fault()
+        {
+            return Err(self.tree_error(fault));
+        }
         Ok(self.placed(engine.sink()))
     }
 
@@ -188,30 +194,35 @@ impl Subject {
     /// # Errors
     /// [`CompareError::Store`], [`CompareError::Tree`].
     pub fn finest(&self) -> Result<Mesh, CompareError> {
-        self.unfolded(usize::MAX)
+        self.unfolded(|tree, mesh| unfold_all(tree, mesh, |_, _| ControlFlow::Continue(())))
     }
 
-    /// What the mesh is like as a whole: [`finest`](Self::finest), unless that takes more than [`OUTLINE`] changes.
+    /// What the mesh is like as a whole: [`finest`](Self::finest), but for what a fault keeps back, and unless that takes more
+    /// than [`OUTLINE`] changes.
     ///
     /// # Errors
     /// [`CompareError::Store`], [`CompareError::Tree`].
     pub fn outline(&self) -> Result<Mesh, CompareError> {
-        self.unfolded(OUTLINE)
+        let mut left = OUTLINE;
+        let count = |_: &_, _| {
+            left -= 1;
+            if left == 0 { ControlFlow::Break(()) } else { ControlFlow::Continue(()) }
+        };
+        self.unfolded(|tree, mesh| unfold_what_can_be(tree, mesh, count).map(|_| ()))
     }
 
-    /// The mesh with so many nodes unfolded, those nearest to the roots.
-    fn unfolded(&self, mut most: usize) -> Result<Mesh, CompareError> {
+    /// The mesh with those nodes unfolded that `unfold` unfolds.
+    fn unfolded(
+        &self,
+        unfold: impl FnOnce(&mut Settled<AnyTree>, &mut ActiveMesh) -> Result<(), TreeError>,
+    ) -> Result<Mesh, CompareError> {
         if let Store::InMemory(_, log) = &self.store {
             return Ok(log.mesh.clone());
         }
         let mut mesh = ActiveMesh::new();
         let mut tree = self.tree(&Opening::SETTLED)?;
         tree.start(&mut mesh).map_err(|e| self.tree_error(e))?;
-        let count = |_: &_, _| {
-            most -= 1;
-            if most == 0 { ControlFlow::Break(()) } else { ControlFlow::Continue(()) }
-        };
-        unfold_all(&mut tree, &mut mesh, count).map_err(|e| self.tree_error(e))?;
+        unfold(&mut tree, &mut mesh).map_err(|e| self.tree_error(e))?;
         Ok(self.placed(&mesh))
     }
 
@@ -244,7 +255,8 @@ impl Subject {
         Ok(opening.wrap(tree))
     }
 
-    /// Replays `frames` of a path with every strategy and every way to load of the options. `progress` counts frames.
+    /// Replays `frames` of a path with every strategy and every way to load of the options. `progress` counts frames. If that is
+    /// [stopped](Options::stop), the runs are those that were finished.
     ///
     /// # Errors
     /// [`CompareError::NotPrinted`] before anything is done,
@@ -287,27 +299,43 @@ impl Subject {
         let mut runs: Vec<Run> = Vec::new();
         // Those that are yet to be compared with an exact strategy.
         let mut uncompared = Vec::new();
-        for &prefetch in prefetch {
+        'replays: for &prefetch in prefetch {
             let opening = Opening { paging: options.paging, prefetch, pace: options.pace };
             for &strategy in &options.strategies {
                 let settings = options.settings(strategy, &speed);
                 let frames = frames.clone();
-                let replay = Replay { named, path, frames, views: &views, settings, opening };
-                let rows = with_trees!(self, |open| {
-                    let mut rows = replay.measure(open(opening)?, &mut count)?;
-                    if let Some(check) = check.as_mut().filter(|_| is_checked(strategy)) {
-                        replay.check(open(opening)?, check, &mut rows, &mut count)?;
-                    }
-                    rows
-                });
-                runs.push(replay.run_of(prefetch, speed, rows));
+                let replay =
+                    Replay { named, path, frames, views: &views, settings, opening, stop: options.stop };
+                let mut measure = || {
+                    with_trees!(self, |open| {
+                        let mut measured = replay.measure(open(opening)?, &mut count)?;
+                        if let Some(check) = check.as_mut().filter(|_| is_checked(strategy)) {
+                            replay.check(open(opening)?, check, &mut measured.rows, &mut count)?;
+                        }
+                        Ok(measured)
+                    })
+                };
+                let measured = match measure() {
+                    Err(CompareError::Interrupted) => break 'replays,
+                    measured => measured?,
+                };
+                runs.push(replay.run_of(prefetch, speed, measured));
                 if is_checked(strategy) && check.is_none() {
                     uncompared.push((runs.len() - 1, replay));
                 }
             }
         }
-        for (at, wrong) in self.compare(uncompared, &mut count)? {
-            runs[at].rows.iter_mut().zip(wrong).for_each(|(row, wrong)| row.wrong = Some(wrong));
+        match self.compare(uncompared.clone(), &mut count) {
+            Ok(all) => {
+                for (at, wrong) in all {
+                    runs[at].rows.iter_mut().zip(wrong).for_each(|(row, wrong)| row.wrong = Some(wrong));
+                }
+            }
+            // What has not been compared is not finished.
+            Err(CompareError::Interrupted) => {
+                uncompared.iter().rev().for_each(|&(at, _)| drop(runs.remove(at)));
+            }
+            Err(error) => return Err(error),
         }
         self.check = check;
         Ok(runs)

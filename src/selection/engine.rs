@@ -288,6 +288,12 @@ impl<T: Refine<S>, S> Engine<T, S> {
         &self.missing
     }
 
+    /// Takes the first fault since the last call: in which file, where, and what is wrong there. How many a frame had is in
+    /// its [report](PageStats::faults); what they keep back is among its [misses](Self::missing) while it is wanted.
+    pub fn take_fault(&mut self) -> Option<TreeError> {
+        self.tree.take_fault()
+    }
+
     /// How the engine refines.
     pub fn settings(&self) -> &Settings {
         &self.settings

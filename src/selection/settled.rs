@@ -127,6 +127,9 @@ impl<T: Hierarchy> Hierarchy for Settled<T> {
     fn settle(&mut self) -> Result<Duration, TreeError> {
         self.tree.settle()
     }
+    fn take_fault(&mut self) -> Option<TreeError> {
+        self.tree.take_fault()
+    }
     fn assert_well_formed(&self) {
         self.tree.assert_well_formed();
     }

@@ -52,7 +52,7 @@ impl BruteForce {
     /// Unfolds all of a tree that has been [started](Refine::start), is wholly folded, and has memory for everything.
     ///
     /// # Errors
-    /// What the backend reports.
+    /// Those of [`unfold_all`].
     pub fn new<T: Refine<NullSink>>(tree: &mut T) -> Result<Self, TreeError> {
         let mut all = Self { at_first: tree.displayed(), ..Self::default() };
         let mut displayed = all.at_first;
@@ -197,22 +197,38 @@ impl BruteForce {
 /// that breaks off. Waits for pages.
 ///
 /// # Errors
-/// What the backend reports.
+/// What the backend reports; the first fault, if one keeps a node back; and [`TreeError::Incomplete`].
 pub fn unfold_all<T: Refine<S>, S>(
     tree: &mut T,
     sink: &mut S,
-    mut unfolded: impl FnMut(&T, NodeId) -> ControlFlow<()>,
+    unfolded: impl FnMut(&T, NodeId) -> ControlFlow<()>,
 ) -> Result<(), TreeError> {
-    let all = unfold_what_can(tree, sink, &mut unfolded);
-    tree.finish(sink);
-    all
+    match unfold_what_can_be(tree, sink, unfolded)? {
+        0 => Ok(()),
+        nodes => Err(tree.take_fault().unwrap_or(TreeError::Incomplete { nodes })),
+    }
 }
 
-fn unfold_what_can<T: Refine<S>, S>(
+/// As [`unfold_all`], but for what a fault or want of memory keeps back. Returns how many nodes that are; nothing is known of
+/// those below them.
+///
+/// # Errors
+/// What the backend reports.
+pub fn unfold_what_can_be<T: Refine<S>, S>(
+    tree: &mut T,
+    sink: &mut S,
+    mut unfolded: impl FnMut(&T, NodeId) -> ControlFlow<()>,
+) -> Result<usize, TreeError> {
+    let left = unfold(tree, sink, &mut unfolded);
+    tree.finish(sink);
+    left
+}
+
+fn unfold<T: Refine<S>, S>(
     tree: &mut T,
     sink: &mut S,
     unfolded: &mut impl FnMut(&T, NodeId) -> ControlFlow<()>,
-) -> Result<(), TreeError> {
+) -> Result<usize, TreeError> {
     let mut active = vec![false; tree.node_limit() as usize];
     let mut waiting: VecDeque<NodeId> = tree.roots().iter().copied().collect();
     let mut arrived = Vec::new();
@@ -227,11 +243,11 @@ fn unfold_what_can<T: Refine<S>, S>(
                 active[node.index()] = true;
                 put_off = 0;
                 if unfolded(tree, node).is_break() {
-                    return Ok(());
+                    return Ok(0);
                 }
                 waiting.extend(tree.children(node));
             }
-            _ if put_off > 2 * waiting.len() + 100 => return Ok(()),
+            _ if put_off > 2 * waiting.len() + 100 => return Ok(1 + waiting.len()),
             _ => {
                 put_off += 1;
                 waiting.push_back(node);
@@ -242,5 +258,5 @@ fn unfold_what_can<T: Refine<S>, S>(
             }
         }
     }
-    Ok(())
+    Ok(0)
 }

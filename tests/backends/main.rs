@@ -20,6 +20,7 @@ mod walks;
 mod conformance;
 mod conforming;
 mod detail_block;
+mod faults;
 mod meta_node;
 mod mt_partition;
 mod page_store;

@@ -3,6 +3,8 @@
 mod backends;
 mod commands;
 mod comparison;
+mod crashes;
+mod damage;
 mod destinations;
 mod examples;
 mod failures;

@@ -116,7 +116,7 @@ fn an_interrupt_leaves_nothing() {
     let sent = Instant::now();
     let output = child.wait_with_output().unwrap();
     println!("ended {:?} later", sent.elapsed());
-    assert_eq!(output.status.code(), Some(1));
+    assert_eq!(output.status.code(), Some(130));
     assert_eq!(String::from_utf8_lossy(&output.stderr), "foldfront: interrupted\n");
     assert_eq!(place.everything(), before);
 }

@@ -138,11 +138,12 @@ fn replay(
     frame: Option<Duration>,
 ) -> Vec<FrameReport> {
     let mut reports = Vec::new();
-    let after = |at: usize, objects: &foldfront::experiment::stored_scene::StoredObjects, report| {
+    let after = |at: usize, objects: &mut foldfront::experiment::stored_scene::StoredObjects, report| {
         if at.is_multiple_of(10) {
             objects.assert_well_formed();
         }
         reports.push(report);
+        std::ops::ControlFlow::Continue(())
     };
     scene.replay(views, settings(strategy), paging, frame, after).unwrap();
     reports

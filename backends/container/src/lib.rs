@@ -45,6 +45,7 @@ pub mod output;
 mod placing;
 mod section;
 mod table;
+pub mod temporary;
 mod writer;
 
 #[cfg(test)]

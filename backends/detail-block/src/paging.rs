@@ -84,6 +84,8 @@ pub(crate) struct Paging {
     stats: PageStats,
     pub counts: PagingCounts,
     error: Option<XfmError>,
+    /// The first since somebody asked.
+    pub fault: Option<TreeError>,
     /// Kept for their allocations.
     arrivals: Vec<Arrival<Stored>>,
     withdrawn: Vec<Run>,
@@ -114,6 +116,7 @@ impl Paging {
             stats: PageStats::default(),
             counts: PagingCounts::default(),
             error: None,
+            fault: None,
             arrivals: Vec::new(),
             withdrawn: Vec::new(),
         })
@@ -242,7 +245,7 @@ impl Paging {
         }
     }
 
-    fn insert(&mut self, mut inflated: Inflated) {
+    pub fn insert(&mut self, mut inflated: Inflated) {
         let number = inflated.block.number;
         self.failures.forget(number);
         inflated.block.used = self.frame;
@@ -259,7 +262,9 @@ impl Paging {
         } else if self.failures.failed(number, self.frame) >= ATTEMPTS {
             self.failures.forget(number);
             self.error = Some(error);
+            return;
         }
+        self.fault.get_or_insert_with(|| tree_error(error));
     }
 
     pub fn take_error(&mut self) -> Result<(), TreeError> {

@@ -229,6 +229,10 @@ impl Hierarchy for XfmTree {
         Ok(())
     }
 
+    fn take_fault(&mut self) -> Option<TreeError> {
+        self.paging.fault.take()
+    }
+
     fn begin_frame(&mut self, arrived: &mut Vec<NodeId>) -> Result<(), TreeError> {
         self.paging.begin_frame(arrived)
     }

@@ -1,8 +1,14 @@
-//! Checks a whole file: every block, every reference, nesting, and that needs never go in a circle.
+//! Checks a whole file: every block, every reference, nesting, that needs never go in a circle, and in the end that everything
+//! can be unfolded: whether w x y z are around one vertex depends on all that has been unfolded before.
 //!
-//! Takes memory for some 60 bytes a node.
+//! Every block is read once. Takes memory for the whole hierarchy, and some 60 bytes a node beside it.
 
-use vertex_tree::{Bounds, NONE, NodeId, NormalCone};
+use std::sync::Arc;
+
+use vertex_tree::{
+    Bounds, Hierarchy, MeshSink, NONE, NodeId, NormalCone, Prefetch, Step, TreeError, TriangleId, VertexId,
+    VertexTree,
+};
 
 use crate::block::Inflated;
 use crate::cone;
@@ -10,6 +16,19 @@ use crate::error::XfmError;
 use crate::file::XfmFile;
 use crate::half_edges::Adjacent;
 use crate::numbering::{Owner, owner};
+use crate::settings::{Io, Settings};
+use crate::tree::XfmTree;
+
+/// For whom the mesh is followed that nobody looks at.
+struct Nobody;
+
+impl MeshSink for Nobody {
+    fn vertex_added(&mut self, _: VertexId, _: [f32; 3]) {}
+    fn vertex_removed(&mut self, _: VertexId) {}
+    fn triangle_added(&mut self, _: TriangleId, _: [VertexId; 3]) {}
+    fn triangle_removed(&mut self, _: TriangleId) {}
+    fn corner_moved(&mut self, _: TriangleId, _: usize, _: VertexId) {}
+}
 
 /// Half of the relative slack that building leaves between nested spheres.
 const SLACK: f64 = 1.0 / (1 << 21) as f64;
@@ -28,7 +47,7 @@ impl XfmFile {
     ///
     /// # Errors
     /// The first thing that is wrong.
-    pub fn verify(&self) -> Result<(), XfmError> {
+    pub fn verify(self: &Arc<Self>) -> Result<(), XfmError> {
         self.verify_unknown()?;
         let header = self.header();
         let (levels, count) = (header.levels, header.nodes as usize);
@@ -40,6 +59,8 @@ impl XfmFile {
             flags: Vec::with_capacity(header.blocks as usize),
         };
         let mut half_edges = Vec::with_capacity(count);
+        let settings = Settings { io: Io::Blocking, prefetch: Prefetch::None, ..Settings::default() };
+        let mut tree = XfmTree::new(self.clone(), settings)?;
         // What is above each block, as its parent's block says.
         let mut named = vec![NONE; header.blocks as usize];
         let mut bytes = Vec::new();
@@ -78,6 +99,7 @@ impl XfmFile {
                 kept.above.push([parent, NONE, NONE, NONE, NONE]);
             }
             kept.flags.push(block.flags);
+            tree.paging.insert(Inflated { block, nodes });
         }
         if triangles != header.triangles {
             return Err(XfmError::Field {
@@ -89,7 +111,49 @@ impl XfmFile {
             });
         }
         self.check_references(&mut kept, &half_edges)?;
-        self.check_order(&kept)
+        self.check_order(&kept)?;
+        drop((kept, half_edges));
+        self.unfold_all(&mut tree)
+    }
+
+    /// Unfolds everything, needs first.
+    fn unfold_all(&self, tree: &mut XfmTree) -> Result<(), XfmError> {
+        let wrong = |node: NodeId, reason| {
+            let offset = self.place(self.levels().block(node)).0;
+            XfmError::Node { file: self.name().to_owned(), offset, node: node.0, reason }
+        };
+        let damaged = |node| {
+            move |error| match error {
+                TreeError::Damaged { reason, .. } => wrong(node, reason),
+                _ => wrong(node, "it can not be unfolded"),
+            }
+        };
+        tree.base_mesh(&mut Nobody).map_err(damaged(NodeId(0)))?;
+        let mut waiting: Vec<NodeId> = tree.roots().to_vec();
+        while let Some(&node) = waiting.last() {
+            if tree.paging.blocks.is_active(node) {
+                waiting.pop();
+                continue;
+            }
+            match tree.unfold(node, &mut Nobody).map_err(damaged(node))? {
+                Step::Done => {
+                    waiting.pop();
+                    waiting.extend(tree.children(node));
+                }
+                // It comes first, and what is above it before. That this ends follows from the order that has been checked.
+                Step::Needs(other) => {
+                    let mut above = Some(other);
+                    while let Some(node) = above.filter(|&node| !tree.paging.blocks.is_active(node)) {
+                        waiting.push(node);
+                        above = tree.parents(node).next();
+                    }
+                }
+                Step::Blocked | Step::StillNeeded | Step::NotResident => {
+                    return Err(wrong(node, "it can not be unfolded"));
+                }
+            }
+        }
+        Ok(())
     }
 
     /// The place of a node among all, if it is there.

@@ -70,7 +70,7 @@ use std::time::Duration;
 
 use page_store::{Arrival, Failures, NOW, Requests, Ticket};
 use rustc_hash::FxHashMap;
-use vertex_tree::{NONE, PageStats, Prefetch, prefetch};
+use vertex_tree::{NONE, PageStats, Prefetch, TreeError, prefetch};
 
 use self::foresight::Foresight;
 use self::place_holders::{Holder, PlaceHolders};
@@ -133,7 +133,7 @@ pub(crate) struct Pager {
     /// have been taken back.
     pub news: Vec<u32>,
     stats: PageStats,
-    last_fault: Option<MetaNodeError>,
+    fault: Option<TreeError>,
     /// Kept for their allocations.
     arrivals: Vec<Arrival<Stored>>,
     withdrawn: Vec<u32>,
@@ -163,7 +163,7 @@ impl Pager {
             failures: Failures::new(LONGEST_REST),
             news: Vec::new(),
             stats: PageStats::default(),
-            last_fault: None,
+            fault: None,
             arrivals: Vec::new(),
             withdrawn: Vec::new(),
             missing: Vec::new(),
@@ -217,8 +217,9 @@ impl Pager {
         prefetch(&self.places.holders, holder as usize);
     }
 
-    pub fn last_fault(&self) -> Option<&MetaNodeError> {
-        self.last_fault.as_ref()
+    /// The first fault since the last call.
+    pub fn take_fault(&mut self) -> Option<TreeError> {
+        self.fault.take()
     }
 
     // Frames.
@@ -283,7 +284,7 @@ impl Pager {
     }
 
     fn fail(&mut self, page: u32, fault: MetaNodeError) {
-        self.last_fault = Some(fault);
+        self.fault.get_or_insert_with(|| TreeError::Store(fault.into()));
         self.release(page);
         self.failures.failed(page, self.frame);
         if self.how == Prefetch::Paper {

@@ -86,12 +86,6 @@ impl MetaNodeTree {
         self.pager.find(self.place(node).0).is_some()
     }
 
-    /// What the last read that failed found, if any has.
-    #[must_use]
-    pub fn last_fault(&self) -> Option<&MetaNodeError> {
-        self.pager.last_fault()
-    }
-
     /// The page of a node, and its slot there.
     #[inline(always)]
     fn place(&self, node: NodeId) -> (u32, u32) {
@@ -312,6 +306,10 @@ impl Hierarchy for MetaNodeTree {
     fn pass(&mut self, time: Duration) -> Result<(), TreeError> {
         self.pager.pass(time);
         Ok(())
+    }
+
+    fn take_fault(&mut self) -> Option<TreeError> {
+        self.pager.take_fault()
     }
 
     fn begin_frame(&mut self, arrived: &mut Vec<NodeId>) -> Result<(), TreeError> {

@@ -28,7 +28,7 @@ use std::time::Duration;
 
 use page_store::{Arrival, Failures, NOW, Requests, Ticket};
 use rustc_hash::FxHashMap;
-use vertex_tree::{NodeId, PageStats, Prefetch};
+use vertex_tree::{NodeId, PageStats, Prefetch, TreeError};
 
 pub(crate) use self::change::Change;
 use self::change::Need;
@@ -99,6 +99,8 @@ pub(crate) struct Paging {
     /// What the engine foresees, where that is asked for.
     foresight: Option<Foresight>,
     stats: PageStats,
+    /// The first since somebody asked.
+    pub fault: Option<TreeError>,
 }
 
 impl Paging {
@@ -129,6 +131,7 @@ impl Paging {
             pressed: 0,
             foresight: (prefetch == Prefetch::Schedule).then(Foresight::default),
             stats: PageStats::default(),
+            fault: None,
         }
     }
 
@@ -181,7 +184,9 @@ impl Paging {
     fn contradicts(&mut self, node: u32) -> bool {
         let unit = self.nodes.unit_of(node);
         if !self.is_paused(unit) {
-            self.stats.faults += 1;
+            self.count_fault(
+                self.damaged(node, "it and a node beside it say different things of each other"),
+            );
             self.failures.failed(unit, self.frame);
         }
         if self.nodes.residents.is_free(node, self.frame) {
@@ -276,18 +281,42 @@ impl Paging {
         self.failures.rests(unit, self.frame)
     }
 
+    fn damaged(&self, node: u32, reason: &'static str) -> TreeError {
+        let file = &self.nodes.file;
+        TreeError::Damaged { file: file.name().to_owned(), offset: file.offset(node), reason }
+    }
+
+    fn count_fault(&mut self, fault: TreeError) {
+        self.stats.faults += 1;
+        self.fault.get_or_insert(fault);
+    }
+
     /// Takes in what the store answers.
     fn arrive(&mut self, arrival: Arrival<Stored>, arrived: &mut Vec<NodeId>) {
         let Arrival { read: nodes, is_demanded, content } = arrival;
         let unit = self.nodes.unit_of(nodes.start);
         let waiting = self.reads.remove(&unit).map_or(Vec::new(), |read| read.waiting);
-        let mut is_whole = content.is_ok();
-        for (node, record) in nodes.clone().zip(content.unwrap_or_default()) {
-            let record = record.ok().filter(|record| self.nodes.fits_file(node, record));
-            let Some(record) = record else {
-                is_whole = false;
-                self.stats.faults += 1;
-                continue;
+        let mut is_whole = true;
+        let records = content.unwrap_or_else(|fault| {
+            // It has been counted.
+            is_whole = false;
+            self.fault.get_or_insert_with(|| TreeError::Store(fault.into()));
+            Vec::new()
+        });
+        for (node, record) in nodes.clone().zip(records) {
+            let record = match record {
+                Ok(record) if self.nodes.fits_file(node, &record) => record,
+                wrong => {
+                    is_whole = false;
+                    self.count_fault(match wrong {
+                        Err(fault) => TreeError::Store(fault.into()),
+                        Ok(_) => self.damaged(
+                            node,
+                            "it is not among the roots, or the triangles at first, as the file says",
+                        ),
+                    });
+                    continue;
+                }
             };
             if self.nodes.take_in(node, record) {
                 if let Some(foresight) = self.foresight.as_mut().filter(|_| !is_demanded) {

@@ -25,6 +25,12 @@ pub enum TreeError {
     /// A store of a kind that this enum does not know can not go on.
     #[error("{0}")]
     Store(Box<dyn std::error::Error + Send + Sync>),
+    /// All nodes were asked for, and some can not be unfolded in the memory that there is.
+    #[error("{nodes} nodes can not be unfolded in the memory that there is")]
+    Incomplete {
+        /// How many, and nothing is known of those below them.
+        nodes: usize,
+    },
     /// A page does not hold what it should.
     #[error("{file}: page at offset {offset} is damaged: {reason}")]
     Damaged {

@@ -105,7 +105,12 @@ pub trait Hierarchy {
         &self,
         node: NodeId,
     ) -> impl Iterator<Item = (NodeId, Bounds, impl Iterator<Item = NodeId>)> {
-        self.children(node).map(|child| (child, self.bounds(child), self.parents(child)))
+        self.children_and_bounds(node).map(move |(child, bounds)| {
+            // In a tree that is known without a look at the child, whose page need not be in memory.
+            let own = Self::IS_TREE.then_some(node);
+            let looked_up = (!Self::IS_TREE).then(|| self.parents(child)).into_iter().flatten();
+            (child, bounds, own.into_iter().chain(looked_up))
+        })
     }
     /// The cone of normals of a node that is no root, asked for as it comes into play. Cones are nested as bounds are,
     /// but for roots, which have none.
@@ -177,6 +182,12 @@ pub trait Hierarchy {
     /// Those of [`begin_frame`](Self::begin_frame).
     fn settle(&mut self) -> Result<Duration, TreeError> {
         Ok(Duration::ZERO)
+    }
+    /// Takes the first of the faults since the last call: in which file, where, and what is wrong there. How many there were is in
+    /// [`PageStats::faults`]. What they befell is asked for again while it is wanted; a fault that will not be mended so is an
+    /// error of the frame.
+    fn take_fault(&mut self) -> Option<TreeError> {
+        None
     }
     /// Checks what the backend knows of its own state, between two frames: for tests. The engine's own check calls it.
     ///

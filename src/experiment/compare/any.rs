@@ -51,8 +51,9 @@ pub fn replay_any<T: VertexTree>(
             views: &views,
             settings: options.settings(strategy, &speed),
             opening,
+            stop: options.stop,
         };
-        let mut rows = replay.measure(opening.wrap(open().map_err(wrap)?), &mut count)?;
+        let mut measured = replay.measure(opening.wrap(open().map_err(wrap)?), &mut count)?;
         if is_checked(at) {
             let check = match &mut check {
                 Some(check) => check,
@@ -62,9 +63,9 @@ pub fn replay_any<T: VertexTree>(
                     none.insert(Check::Nodes(BruteForce::new(&mut whole).map_err(wrap)?))
                 }
             };
-            replay.check(opening.wrap(open().map_err(wrap)?), check, &mut rows, &mut count)?;
+            replay.check(opening.wrap(open().map_err(wrap)?), check, &mut measured.rows, &mut count)?;
         }
-        runs.push(replay.run_of(Loading::None, speed, rows));
+        runs.push(replay.run_of(Loading::None, speed, measured));
     }
     Ok(runs)
 }

@@ -1,6 +1,5 @@
 //! `frames.csv` and `summary.csv`: the columns are a contract that other programs rely on.
 
-use std::path::{Path, PathBuf};
 use std::time::Duration;
 
 use vertex_tree::PageStats;
@@ -62,14 +61,6 @@ const SUMMARY: [&str; 22] = [
     "wrong_mean",
     "wrong_max",
 ];
-
-/// A file could not be written.
-#[derive(Debug, thiserror::Error)]
-#[error("{}: {source}", file.display())]
-pub struct WriteError {
-    file: PathBuf,
-    source: std::io::Error,
-}
 
 /// Figures of a run that its tables show.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -195,12 +186,10 @@ impl Summary {
     }
 }
 
-/// Writes `frames.csv`.
-///
-/// # Errors
-/// If the file can not be written; nothing is left behind then.
-pub fn write_frames(file: &Path, runs: &[&Run]) -> Result<(), WriteError> {
-    write(file, &FRAMES, |out| {
+/// The text of `frames.csv`.
+#[must_use]
+pub fn frames(runs: &[&Run]) -> Vec<u8> {
+    text(&FRAMES, |out| {
         for run in runs {
             for row in &run.rows {
                 let r = &row.report;
@@ -237,12 +226,10 @@ pub fn write_frames(file: &Path, runs: &[&Run]) -> Result<(), WriteError> {
     })
 }
 
-/// Writes `summary.csv`.
-///
-/// # Errors
-/// If the file can not be written; nothing is left behind then.
-pub fn write_summary(file: &Path, runs: &[&Run]) -> Result<(), WriteError> {
-    write(file, &SUMMARY, |out| {
+/// The text of `summary.csv`.
+#[must_use]
+pub fn summary(runs: &[&Run]) -> Vec<u8> {
+    text(&SUMMARY, |out| {
         for run in runs {
             let s = Summary::new(run);
             out.write_record([
@@ -274,18 +261,10 @@ pub fn write_summary(file: &Path, runs: &[&Run]) -> Result<(), WriteError> {
     })
 }
 
-fn write(
-    file: &Path,
-    header: &[&str],
-    rows: impl FnOnce(&mut csv::Writer<Vec<u8>>) -> Result<(), csv::Error>,
-) -> Result<(), WriteError> {
+fn text(header: &[&str], rows: impl FnOnce(&mut csv::Writer<Vec<u8>>) -> Result<(), csv::Error>) -> Vec<u8> {
     let mut out = csv::Writer::from_writer(Vec::new());
-    let bytes = out
-        .write_record(header)
-        .and_then(|()| rows(&mut out))
-        .map_err(std::io::Error::other)
-        .and_then(|()| out.into_inner().map_err(|e| std::io::Error::other(e.to_string())));
-    bytes
-        .and_then(|bytes| container::output::write(file, &bytes))
-        .map_err(|source| WriteError { file: file.to_owned(), source })
+    let written = out.write_record(header).and_then(|()| rows(&mut out));
+    debug_assert!(written.is_ok(), "every row has as many fields as the header: {written:?}");
+    // Memory does not fail.
+    out.into_inner().unwrap_or_default()
 }

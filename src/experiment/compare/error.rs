@@ -85,6 +85,9 @@ pub enum CompareError {
         /// Why.
         source: Box<StoredSceneError>,
     },
+    /// [`Options::stop`](super::Options::stop) was raised.
+    #[error("interrupted")]
+    Interrupted,
     /// A strategy's cut is not the oracle's.
     #[error("{0}")]
     Wrong(Box<WrongCut>),

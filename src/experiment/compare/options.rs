@@ -1,5 +1,6 @@
 //! What is compared, and how.
 
+use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::Duration;
 
 use meta_node::Dependencies;
@@ -17,7 +18,7 @@ use selection::refine::Strategy;
 use selection::view::{View, theta_of_pixels};
 
 /// What to replay, and how.
-#[derive(Clone, Debug, PartialEq)]
+#[derive(Clone, Debug)]
 pub struct Options {
     /// In this order.
     pub strategies: Vec<Strategy>,
@@ -43,6 +44,8 @@ pub struct Options {
     pub prefetch: Vec<Loading>,
     /// How time passes.
     pub pace: Pace,
+    /// Raised by whoever wants the comparison to end: it then gives the runs that it has finished.
+    pub stop: Option<&'static AtomicBool>,
 }
 
 /// How time passes in a replay.
@@ -103,11 +106,17 @@ impl Default for Options {
             paging: Paging::default(),
             prefetch: vec![Loading::Paper],
             pace: Pace::Settled,
+            stop: None,
         }
     }
 }
 
 impl Options {
+    /// Whether somebody wants the comparison to end.
+    pub(super) fn is_stopped(&self) -> bool {
+        self.stop.is_some_and(|stop| stop.load(Ordering::Relaxed))
+    }
+
     /// How an engine refines along a path of this declared speed.
     pub(super) fn settings(&self, strategy: Strategy, speed: &Speed) -> Settings {
         Settings {

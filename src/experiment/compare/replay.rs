@@ -1,6 +1,7 @@
 //! One strategy along one path.
 
 use std::ops::Range;
+use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::{Duration, Instant};
 
 use vertex_tree::{Hierarchy, NodeId, NullSink, Refine, TreeError, VertexTree};
@@ -9,7 +10,7 @@ use super::error::{CompareError, WrongCut};
 use super::loading::Loading;
 use super::opening::Opening;
 use super::options::Pace;
-use super::run::{Check, Row, Run};
+use super::run::{Check, Measured, Row, Run};
 use crate::experiment::path::Path;
 use selection::active_mesh::ActiveMesh;
 use selection::engine::{Engine, FrameReport, Settings};
@@ -29,6 +30,7 @@ pub struct Named<'a> {
     pub has_dependencies: bool,
 }
 
+#[derive(Clone)]
 pub(super) struct Replay<'a> {
     pub named: Named<'a>,
     pub path: &'a Path,
@@ -36,6 +38,7 @@ pub(super) struct Replay<'a> {
     pub views: &'a [View],
     pub settings: Settings,
     pub opening: Opening,
+    pub stop: Option<&'static AtomicBool>,
 }
 
 /// Rounds of waiting for a first frame: as many as its pages can lie below each other.
@@ -47,7 +50,8 @@ impl Replay<'_> {
     }
 
     /// What has been measured as a run.
-    pub fn run_of(&self, prefetch: Loading, speed: Speed, rows: Vec<Row>) -> Run {
+    pub fn run_of(&self, prefetch: Loading, speed: Speed, measured: Measured) -> Run {
+        let Measured { rows, fault } = measured;
         Run {
             scene: self.named.scene.to_owned(),
             path: self.path.name.clone(),
@@ -56,6 +60,7 @@ impl Replay<'_> {
             prefetch,
             speed,
             rows,
+            fault,
         }
     }
 
@@ -72,6 +77,9 @@ impl Replay<'_> {
         // While a frame waits for the store the path does not go on.
         let mut stalled = Duration::ZERO;
         for (at, (frame, view)) in self.frames.clone().zip(self.views).enumerate() {
+            if self.stop.is_some_and(|stop| stop.load(Ordering::Relaxed)) {
+                return Err(CompareError::Interrupted);
+            }
             let views = std::slice::from_ref(view);
             match self.opening.pace {
                 Pace::Settled => {}
@@ -117,15 +125,19 @@ impl Replay<'_> {
         &self,
         tree: Settled<T>,
         count: &mut impl FnMut(),
-    ) -> Result<Vec<Row>, CompareError> {
+    ) -> Result<Measured, CompareError> {
         let mut rows = Vec::with_capacity(self.views.len());
+        let mut fault = None;
         self.run(tree, ActiveMesh::new(), |frame, engine, report| {
             engine.sink_mut().clear_changes();
+            if report.pages.faults > 0 && fault.is_none() {
+                fault = engine.take_fault().map(|fault| fault.to_string());
+            }
             rows.push(Row { frame, report, wrong: None });
             count();
             Ok(())
         })?;
-        Ok(rows)
+        Ok(Measured { rows, fault })
     }
 
     /// Compares every frame with brute force. What a store on virtual time refuses is the same as when that was measured.

@@ -35,6 +35,14 @@ pub struct Run {
     pub speed: Speed,
     /// The frames.
     pub rows: Vec<Row>,
+    /// The first of the faults, if there were any: in which file, where, and what is wrong there.
+    pub fault: Option<String>,
+}
+
+/// What a replay that is measured gives.
+pub(super) struct Measured {
+    pub rows: Vec<Row>,
+    pub fault: Option<String>,
 }
 
 /// Brute force, over the collapse log or over a backend's own nodes.

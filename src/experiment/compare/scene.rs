@@ -3,7 +3,7 @@
 //! All objects share one memory; see [`objects`](crate::experiment::stored_scene::StoredScene) for what else. A check compares every object in every
 //! frame with the brute-force cut of its own nodes, in a replay of its own.
 
-use std::ops::Range;
+use std::ops::{ControlFlow, Range};
 
 use super::error::CompareError;
 use super::opening::Opening;
@@ -46,6 +46,7 @@ pub fn replay_scene(
         done += 1;
         progress(done, replays as u64);
     };
+    let goes_on = || if options.is_stopped() { ControlFlow::Break(()) } else { ControlFlow::Continue(()) };
     let mut runs: Vec<Run> = Vec::new();
     for &prefetch in &options.prefetch {
         let opening = Opening { paging: options.paging, prefetch, pace: options.pace };
@@ -56,11 +57,16 @@ pub fn replay_scene(
         for &strategy in &options.strategies {
             let settings = options.settings(strategy, &speed);
             let (backend, scene_name, path) = (scene.backend(), name.to_owned(), path.name.clone());
-            let mut rows = Vec::with_capacity(views.len());
+            let (mut rows, mut fault) = (Vec::with_capacity(views.len()), None);
             // A memory and a store for each replay.
-            let measured = scene.replay(&views, settings, &opening.scene(), frame_time, |at, _, report| {
-                rows.push(Row { frame: frames.start + at, report, wrong: None });
-            });
+            let measured =
+                scene.replay(&views, settings, &opening.scene(), frame_time, |at, objects, report| {
+                    if report.pages.faults > 0 && fault.is_none() {
+                        fault = objects.take_fault().map(|fault| fault.to_string());
+                    }
+                    rows.push(Row { frame: frames.start + at, report, wrong: None });
+                    goes_on()
+                });
             measured.map_err(wrap)?;
             count();
             if let Some(brute_force) = &mut brute_force {
@@ -73,6 +79,7 @@ pub fn replay_scene(
                         if is_exact && unexplained > 0 {
                             differs = differs.or(Some((frames.start + at, unexplained)));
                         }
+                        goes_on()
                     });
                 checked.map_err(wrap)?;
                 count();
@@ -81,7 +88,10 @@ pub fn replay_scene(
                     return Err(CompareError::Differs { scene, path, frame, strategy, backend, wrong });
                 }
             }
-            runs.push(Run { scene: scene_name, path, backend, strategy, prefetch, speed, rows });
+            if options.is_stopped() {
+                return Ok(runs);
+            }
+            runs.push(Run { scene: scene_name, path, backend, strategy, prefetch, speed, rows, fault });
         }
     }
     Ok(runs)

@@ -59,6 +59,7 @@ pub(super) const PAGING: &[(&str, &str)] = &[
         "stalled ms",
         "what changes have waited for the store: virtual time with --fps, where only blocking waits",
     ),
+    ("faults", "reads that failed, or brought what is damaged; what they keep back is not displayed"),
 ];
 
 /// Columns of the table of files and construction.
@@ -88,7 +89,12 @@ pub(super) fn strategies(runs: &[Run]) -> Table {
             microseconds(s.apply_median),
             format!("{:.0}", s.tests_mean),
             format!("{:.1}", s.changes_mean),
-            format!("{:.1}", s.tests_mean / s.changes_mean.max(1e-9)),
+            // Where nothing changes there is no ratio.
+            if s.changes_mean > 0.0 {
+                format!("{:.1}", s.tests_mean / s.changes_mean)
+            } else {
+                "–".to_owned()
+            },
             format!("{:.0}", s.active_nodes_mean),
             format!("{:.0}", s.triangles_mean),
             s.wrong.map_or_else(String::new, |w| format!("{:.1}, {}", w.mean, w.largest)),
@@ -117,6 +123,7 @@ pub(super) fn paging(runs: &[&Run]) -> Table {
             format!("{:.1}", s.memory_limited),
             mebibytes(s.peak_resident_bytes),
             format!("{:.1}", 1e3 * s.stalled.as_secs_f64()),
+            s.faults.to_string(),
         ]
     };
     Table { columns: PAGING, rows: runs.iter().map(row).collect() }

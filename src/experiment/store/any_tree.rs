@@ -106,6 +106,30 @@ impl Hierarchy for AnyTree {
         any_iterator!(self, tree => tree.children_and_bounds(node))
     }
 
+    fn children_and_parents(
+        &self,
+        node: NodeId,
+    ) -> impl Iterator<Item = (NodeId, Bounds, impl Iterator<Item = NodeId>)> {
+        match self {
+            Self::InMemory(tree) => Either::Left(Either::Left(
+                tree.children_and_parents(node)
+                    .map(|(n, b, parents)| (n, b, Either::Left(Either::Left(parents)))),
+            )),
+            Self::MetaNode(tree) => Either::Left(Either::Right(
+                tree.children_and_parents(node)
+                    .map(|(n, b, parents)| (n, b, Either::Left(Either::Right(parents)))),
+            )),
+            Self::DetailBlock(tree) => Either::Right(Either::Left(
+                tree.children_and_parents(node)
+                    .map(|(n, b, parents)| (n, b, Either::Right(Either::Left(parents)))),
+            )),
+            Self::MtPartition(tree) => Either::Right(Either::Right(
+                tree.children_and_parents(node)
+                    .map(|(n, b, parents)| (n, b, Either::Right(Either::Right(parents)))),
+            )),
+        }
+    }
+
     fn normal_cone(&self, node: NodeId) -> NormalCone {
         any!(self, tree => tree.normal_cone(node))
     }
@@ -148,6 +172,10 @@ impl Hierarchy for AnyTree {
 
     fn settle(&mut self) -> Result<Duration, TreeError> {
         any!(self, tree => tree.settle())
+    }
+
+    fn take_fault(&mut self) -> Option<TreeError> {
+        any!(self, tree => tree.take_fault())
     }
 
     #[track_caller]

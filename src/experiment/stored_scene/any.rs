@@ -20,6 +20,7 @@ pub(super) trait AnyObject {
     ) -> Result<FrameReport, ObjectsError>;
     fn pass(&mut self, time: Duration) -> Result<(), TreeError>;
     fn settle(&mut self) -> Result<Duration, TreeError>;
+    fn take_fault(&mut self) -> Option<TreeError>;
     /// Nodes that brute force would have otherwise, and that no refused change explains.
     fn wrong(&self, brute_force: &mut BruteForce) -> [u64; 2];
     /// What the cut is by brute force. The object is of no use afterwards.
@@ -44,6 +45,10 @@ impl<S, T: Refine<S> + Refine<NullSink>> AnyObject for (Object<T, S>, bool) {
 
     fn settle(&mut self) -> Result<Duration, TreeError> {
         self.0.engine_mut().tree_mut().settle()
+    }
+
+    fn take_fault(&mut self) -> Option<TreeError> {
+        self.0.engine_mut().take_fault()
     }
 
     fn wrong(&self, brute_force: &mut BruteForce) -> [u64; 2] {
@@ -116,6 +121,13 @@ impl StoredObjects {
             waited += self.objects[number].settle().map_err(|source| self.tree_error(number, source))?;
         }
         Ok(waited)
+    }
+
+    /// Takes the first fault of an object since the last call.
+    pub fn take_fault(&mut self) -> Option<StoredSceneError> {
+        let faults = self.objects.iter_mut().map(|object| object.take_fault()).enumerate();
+        let (object, fault) = faults.filter_map(|(object, fault)| Some((object, fault?))).next()?;
+        Some(self.tree_error(object, fault))
     }
 
     /// How many nodes of all fronts have not the status that brute force gives them, and how many of these no change explains

@@ -10,6 +10,7 @@
 //! detail blocks has its own. Objects in memory do not count. Objects of `mt-partition` also have one reader, and one store
 //! where time is virtual; of the others each has a thread, or a store, by itself.
 
+use std::ops::ControlFlow;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use std::time::Duration;
@@ -226,7 +227,7 @@ impl StoredScene {
         all.collect()
     }
 
-    /// Replays views of the scene, and calls `after` with each frame's report. Without a time for a frame, each waits for its
+    /// Replays views of the scene, and calls `after` with each frame's report, until that breaks off. Without a time for a frame, each waits for its
     /// pages, and what all of its advances did is reported as one; otherwise so much virtual time passes before each.
     ///
     /// # Errors
@@ -237,7 +238,7 @@ impl StoredScene {
         settings: Settings,
         paging: &ScenePaging,
         frame_time: Option<Duration>,
-        mut after: impl FnMut(usize, &StoredObjects, FrameReport),
+        mut after: impl FnMut(usize, &mut StoredObjects, FrameReport) -> ControlFlow<()>,
     ) -> Result<(), StoredSceneError> {
         let mut objects = self.trees(settings, paging)?;
         for (frame, view) in views.iter().enumerate() {
@@ -260,7 +261,9 @@ impl StoredScene {
                     all.pages.stalled += waited;
                 }
             }
-            after(frame, &objects, all);
+            if after(frame, &mut objects, all).is_break() {
+                break;
+            }
         }
         Ok(())
     }

@@ -26,7 +26,11 @@ impl<T: Refine<S>, S, F: Watch> Steps<'_, T, S, F> {
                 let (front, tree) = (&*self.front, &*self.tree);
                 let is_folded = |p: &NodeId| !front.record(front.find(tree, *p)).is_active();
                 self.stack.extend(tree.parents(node).filter(is_folded).map(Pending::needed));
-                if (above..self.stack.len()).any(|at| self.waits(self.stack[at].node)) {
+                if self.stack.len() == above {
+                    // It is not in play, and nothing above it is folded: only a damaged store says both.
+                    self.missing.push(node);
+                    self.give_up(None);
+                } else if (above..self.stack.len()).any(|at| self.waits(self.stack[at].node)) {
                     self.give_up(None);
                 } else {
                     self.stack[above - 1].waits = true;

@@ -47,7 +47,7 @@ fn settle<M: MeshSink>(engine: &mut Engine<MetaNodeTree, M>, views: &[View]) -> 
         }
         engine.tree_mut().settle().unwrap();
     }
-    panic!("the camera has stopped, and the cut is not reached: {:?}", engine.tree().last_fault());
+    panic!("the camera has stopped, and the cut is not reached: {:?}", engine.take_fault());
 }
 
 /// A long walk with memory for almost nothing, frames that do not wait, and every now and then a rest: then the cut is the

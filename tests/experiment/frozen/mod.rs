@@ -17,6 +17,11 @@ fn frozen(name: &str) -> PathBuf {
     Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/experiment/frozen").join(name)
 }
 
+/// A file of version 1 that was found to be read badly, or that such a file was made of.
+fn case(name: &str) -> PathBuf {
+    Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/cases/reliability").join(name)
+}
+
 /// The mesh of the files: a hilly grid of 6 by 6 vertices.
 fn hills() -> Mesh {
     let mut mesh = Mesh::default();
@@ -103,7 +108,7 @@ fn version_2_is_written_as_it_was() {
 #[test]
 fn larger_files_of_version_1_are_in_order() {
     for name in ["intact.meta", "intact.mt"] {
-        let store = Store::open(&frozen(name)).unwrap();
+        let store = Store::open(&case(name)).unwrap();
         store.verify().unwrap();
         assert_eq!(store.georeference(), Georeference::default());
         let finest = Subject::of_store(name, store).finest().unwrap();
@@ -119,7 +124,7 @@ fn headers_that_lie_about_sizes_are_refused() {
         ("lying-leaves.meta", "offset 16: the number of leaves is 4294967294"),
         ("lying-largest.meta", "offset 60: the size of the largest page is 1073741823"),
     ] {
-        let error = Store::open(&frozen(name)).err().unwrap().to_string();
+        let error = Store::open(&case(name)).err().unwrap().to_string();
         assert!(error.ends_with(said), "{error}");
     }
 }

@@ -70,10 +70,15 @@ impl<const N: usize> Sorter<N> {
             second.sort_unstable();
         } else {
             // A panic of the helper is passed on when the scope ends.
-            std::thread::scope(|scope| {
-                scope.spawn(|| first.sort_unstable());
+            let is_sorted = std::thread::scope(|scope| {
+                let helper = std::thread::Builder::new().spawn_scoped(scope, || first.sort_unstable());
                 second.sort_unstable();
+                helper.is_ok()
             });
+            // There may be no thread to be had.
+            if !is_sorted {
+                first.sort_unstable();
+            }
         }
         for run in [&*first, &*second] {
             if !run.is_empty() {

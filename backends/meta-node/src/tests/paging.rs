@@ -180,7 +180,8 @@ fn a_panic_in_the_store_is_a_fault() {
     tree.settle().unwrap();
     let (_, stats) = frame(&mut tree, |_| ());
     assert!(stats.faults > 10, "{stats:?}");
-    assert!(tree.last_fault().unwrap().to_string().contains("panicked"), "{:?}", tree.last_fault());
+    let fault = tree.take_fault().unwrap().to_string();
+    assert!(fault.contains("panicked"), "{fault}");
 }
 
 /// Errors, short reads, flipped bits and delays: frames go on, every fault is counted once, and the whole hierarchy is
@@ -212,5 +213,5 @@ fn faults_are_counted_and_later_reads_recover() {
     }
     assert!(faults > 50, "{faults}");
     assert_eq!(faults, faulty.befallen(), "every fault is counted once");
-    assert!(tree.last_fault().is_some());
+    assert!(tree.take_fault().is_some());
 }

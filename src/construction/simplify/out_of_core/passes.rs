@@ -182,7 +182,9 @@ impl Passes<'_> {
             };
             std::thread::scope(|scope| {
                 let helper = || run(&mut vec![Ring::Outside; pieces]);
-                let helpers: Vec<_> = (1..threads).map(|_| scope.spawn(helper)).collect();
+                // Where there is no thread to be had, those that there are do the work.
+                let start = |_| std::thread::Builder::new().spawn_scoped(scope, helper).ok();
+                let helpers: Vec<_> = (1..threads).map_while(start).collect();
                 let own = run(&mut rings);
                 let joined = helpers
                     .into_iter()
