@@ -12,11 +12,15 @@ use foldfront::experiment::scene::{Scene, SceneKind};
 use foldfront::selection::criterion::Criterion;
 use foldfront::{CollapseLog, Mesh};
 
+/// The first frames are for all backends. That the others follow the same cuts in the rest is frozen, see
+/// `tests/experiment/frozen/cuts.rs`; and all do in all frames of the walks over real data.
+const WITH_ALL: usize = 300;
+
 fn recorded_paths(kind: SceneKind) {
     let scene = Scene::new(kind);
     let log = data::log(scene.mesh(&mut |_, _| ()));
     for path in recorded(kind).unwrap() {
-        follow(&log, &path, pixels(1.0), 20_000);
+        follow(&log, &path, pixels(1.0), WITH_ALL, 20_000);
     }
 }
 
@@ -84,7 +88,7 @@ fn several_views() {
 fn imported(trajectory: &str, mesh: Mesh, mode: Mode, rate: f64, theta: f64) {
     let options = Options { mode, rate, ..Options::default() };
     let path = import_text(FilePath::new("made up"), trajectory, &mesh, &options).unwrap();
-    follow(&data::log(mesh), &path, theta, 5_000);
+    follow(&data::log(mesh), &path, theta, usize::MAX, 5_000);
 }
 
 #[test]

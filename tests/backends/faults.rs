@@ -85,7 +85,7 @@ type Backend = (&'static str, Vec<u8>, fn(Arc<dyn PageSource>) -> Result<Store, 
 fn all(log: &CollapseLog) -> [Backend; 3] {
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path().join("file");
-    let mut bytes = |write: &dyn Fn()| {
+    let bytes = |write: &dyn Fn()| {
         write();
         std::fs::read(&path).unwrap()
     };

@@ -29,10 +29,13 @@ fn settings_for(path: &Path) -> Settings {
     Settings { rho: least(usual.rho, 1.0), omega: least(usual.omega, 0.02), ..Settings::default() }
 }
 
-/// Follows all frames of a path, with at least so many changes.
-pub fn follow(log: &CollapseLog, path: &Path, theta: f64, changes: u64) {
+/// Follows all frames of a path, so many of them with all backends, with at least so many changes.
+pub fn follow(log: &CollapseLog, path: &Path, theta: f64, with_all: usize, changes: u64) {
     let mut table = Conformance::new(log, settings_for(path));
     for frame in 0..path.frames.len() {
+        if frame == with_all {
+            table.go_on_with_the_first();
+        }
         table.advance(&[path.view(frame, theta).unwrap()]);
     }
     let totals = table.totals;

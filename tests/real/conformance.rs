@@ -23,7 +23,7 @@ fn imported(name: &str, [trajectory, mesh]: [&str; 2], mode: Mode, rate: f64, th
     needs(name, [trajectory, mesh], move |[trajectory, mesh]: [PathBuf; 2]| {
         let mesh = kit::mesh(mesh);
         let path = import(&trajectory, &mesh, &Options { mode, rate, ..Options::default() }).unwrap();
-        follow(&data::log(mesh), &path, theta, 20_000);
+        follow(&data::log(mesh), &path, theta, usize::MAX, 20_000);
     })
 }
 

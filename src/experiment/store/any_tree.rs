@@ -13,8 +13,6 @@ use vertex_tree::{Bounds, Hierarchy, MeshSink, NodeId, NormalCone, PageStats, St
 ///
 /// To the engine it is a graph with normal cones, as one of them may be: nodes that have one parent say so, and those without a cone
 /// have one that holds all directions.
-// One of them exists a viewer, and is asked often: a box would cost more than the room.
-#[expect(clippy::large_enum_variant, reason = "one exists a viewer")]
 pub enum AnyTree {
     /// The whole hierarchy resident.
     InMemory(InMemoryTree),
