@@ -11,7 +11,7 @@ use mt_partition::CacheMode;
 use page_store::Simulated;
 
 use super::say::Misunderstood;
-use super::values::{backend, cache, duration, frames, positive, prefetch, size, strategy, work_cap};
+use super::values::{backend, cache, duration, frames, memory, positive, prefetch, size, strategy, work_cap};
 use crate::experiment::compare::{Loading, Pace};
 use crate::experiment::path::import;
 use crate::experiment::store::{Backend, BuildOptions};
@@ -66,7 +66,7 @@ pub(super) struct Build {
     pub storage: Storage,
     /// Memory to build within, such as 256M, for meshes that are larger; the rest is kept in temporary files. The result is
     /// the same, but for mt-partition, whose merges are made in another order where the graph does not fit.
-    #[arg(long, value_name = "SIZE", value_parser = size)]
+    #[arg(long, value_name = "SIZE", value_parser = memory)]
     pub memory: Option<u64>,
     /// Threads that share this memory, 1 to 4; the result does not depend on it [default: one a core].
     #[arg(long, value_name = "N", requires = "memory", value_parser = clap::value_parser!(u8).range(1..=4))]

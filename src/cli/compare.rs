@@ -67,7 +67,7 @@ pub(super) fn compare(command: &Compare) -> Result<()> {
         }
         let storage = BuildOptions::from(&command.storage);
         let subjects = input.replayable(&name, &command.backend, &storage, command.merge_components)?;
-        let walks = walks(input, &subjects, &paths)?;
+        let walks = walks(input, &subjects, &paths, options.paging)?;
         interrupt::end_well();
         let is_alone = subjects.len() == 1;
         for subject in subjects {
@@ -139,11 +139,13 @@ fn check_printed(command: &Compare, inputs: &[Input]) -> Result<()> {
 }
 
 /// The walkthroughs to replay: those that were asked for, those that were recorded for a scene, or one around the mesh.
-fn walks(input: &Input, subjects: &[Replayable], paths: &[Path]) -> Result<Vec<Path>> {
+fn walks(input: &Input, subjects: &[Replayable], paths: &[Path], paging: Paging) -> Result<Vec<Path>> {
     Ok(match (paths, input, subjects) {
         ([], Input::Scene(scene), _) => path::recorded(scene.kind())?.to_vec(),
         // What is stored may not fit into memory.
-        ([], _, [Replayable { log: None, subject, .. }, ..]) => vec![path::around(&subject.outline()?)?],
+        ([], _, [Replayable { log: None, subject, .. }, ..]) => {
+            vec![path::around(&subject.outline(paging)?)?]
+        }
         ([], _, [Replayable { log: Some(log), .. }, ..]) => vec![path::around(&log.mesh)?],
         (paths, ..) => paths.to_vec(),
     })

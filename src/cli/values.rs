@@ -7,6 +7,7 @@ use mt_partition::CacheMode;
 
 use crate::experiment::compare::Loading;
 use crate::experiment::store::Backend;
+use construction::simplify::LEAST_MEMORY;
 use selection::budget::WorkCap;
 use selection::refine::Strategy;
 
@@ -22,6 +23,14 @@ pub(super) fn size(text: &str) -> Result<u64, String> {
     match parse_size::Config::new().with_binary().parse_size(text) {
         Ok(bytes @ 1..) => Ok(bytes),
         _ => Err("a size such as 256M, 1G or a number of bytes is expected".to_owned()),
+    }
+}
+
+/// Memory to build within.
+pub(super) fn memory(text: &str) -> Result<u64, String> {
+    match size(text)? {
+        bytes @ LEAST_MEMORY.. => Ok(bytes),
+        _ => Err(format!("at least {}K is expected", LEAST_MEMORY >> 10)),
     }
 }
 
@@ -84,6 +93,7 @@ mod tests {
         for wrong in ["", "0", "M", "-1", "+3K", "0.1", "99999999999G", "64Q"] {
             assert!(size(wrong).is_err(), "{wrong}");
         }
+        assert_eq!((memory("64K"), memory("1")), (Ok(64 << 10), Err("at least 64K is expected".to_owned())));
         assert_eq!(frames("3..7"), Ok(3..7));
         assert_eq!(frames("..7"), Ok(0..7));
         assert!(frames("7..3").is_err());

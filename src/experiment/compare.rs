@@ -66,8 +66,9 @@ pub struct Subject {
     check: Option<Check>,
 }
 
-/// Changes that [`Subject::outline`] makes: enough to tell how large a mesh is and whether it is flat.
-pub const OUTLINE: usize = 1 << 18;
+/// Changes that [`Subject::outline`] makes: enough to tell how large a mesh is and whether it is flat, and few enough for the
+/// memory of any page file.
+pub const OUTLINE: usize = 1 << 12;
 
 /// Calls a generic function with a way to open trees of the subject's backend.
 macro_rules! with_trees {
@@ -194,33 +195,36 @@ impl Subject {
     /// # Errors
     /// [`CompareError::Store`], [`CompareError::Tree`].
     pub fn finest(&self) -> Result<Mesh, CompareError> {
-        self.unfolded(|tree, mesh| unfold_all(tree, mesh, |_, _| ControlFlow::Continue(())))
+        self.unfolded(Paging::UNLIMITED, |tree, mesh| {
+            unfold_all(tree, mesh, |_, _| ControlFlow::Continue(()))
+        })
     }
 
-    /// What the mesh is like as a whole: [`finest`](Self::finest), but for what a fault keeps back, and unless that takes more
-    /// than [`OUTLINE`] changes.
+    /// What the mesh is like as a whole: [`finest`](Self::finest), but for what a fault keeps back or memory has no room for, and
+    /// unless that takes more than [`OUTLINE`] changes.
     ///
     /// # Errors
     /// [`CompareError::Store`], [`CompareError::Tree`].
-    pub fn outline(&self) -> Result<Mesh, CompareError> {
+    pub fn outline(&self, paging: Paging) -> Result<Mesh, CompareError> {
         let mut left = OUTLINE;
         let count = |_: &_, _| {
             left -= 1;
             if left == 0 { ControlFlow::Break(()) } else { ControlFlow::Continue(()) }
         };
-        self.unfolded(|tree, mesh| unfold_what_can_be(tree, mesh, count).map(|_| ()))
+        self.unfolded(paging, |tree, mesh| unfold_what_can_be(tree, mesh, count).map(|_| ()))
     }
 
     /// The mesh with those nodes unfolded that `unfold` unfolds.
     fn unfolded(
         &self,
+        paging: Paging,
         unfold: impl FnOnce(&mut Settled<AnyTree>, &mut ActiveMesh) -> Result<(), TreeError>,
     ) -> Result<Mesh, CompareError> {
         if let Store::InMemory(_, log) = &self.store {
             return Ok(log.mesh.clone());
         }
         let mut mesh = ActiveMesh::new();
-        let mut tree = self.tree(&Opening::SETTLED)?;
+        let mut tree = self.tree(&Opening { paging, ..Opening::SETTLED })?;
         tree.start(&mut mesh).map_err(|e| self.tree_error(e))?;
         unfold(&mut tree, &mut mesh).map_err(|e| self.tree_error(e))?;
         Ok(self.placed(&mesh))

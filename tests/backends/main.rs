@@ -24,4 +24,5 @@ mod faults;
 mod meta_node;
 mod mt_partition;
 mod page_store;
+mod sharing;
 mod slow_store;

@@ -304,3 +304,34 @@ fn a_trajectory_is_kept_where_it_was_recorded() {
         &["--no-fit", "--mode"],
     );
 }
+
+/// File names are whatever the system has, and are shown with replacements where they are no text.
+#[cfg(target_os = "linux")]
+#[test]
+fn names_that_are_not_utf8_work() {
+    use std::ffi::OsStr;
+    use std::os::unix::ffi::OsStrExt;
+
+    let place = Workplace::new();
+    std::fs::copy(place.file("descent.path"), place.file("").join(OsStr::from_bytes(b"p\xff.path"))).unwrap();
+    let run = |words: &[&[u8]]| {
+        let output =
+            place.command("").args(words.iter().map(|word| OsStr::from_bytes(word))).output().unwrap();
+        let said = String::from_utf8_lossy(&output.stderr);
+        assert!(output.status.success(), "{words:?}: {said}");
+        assert_eq!(said, "", "{words:?}");
+    };
+    run(&[b"build", b"grid.ply", b"-o", b"g\xff.fold"]);
+    run(&[b"build", b"g\xff.fold", b"--backend", b"meta-node", b"-o", b"g\xff.meta"]);
+    for file in [&b"g\xff.fold"[..], b"g\xff.meta"] {
+        run(&[b"info", file]);
+        run(&[b"verify", file]);
+        run(&[b"export", file, b"--path", b"p\xff.path", b"--frame", b"0", b"-o", b"x\xff.ply"]);
+        run(&[b"deviation", file, b"--path", b"p\xff.path", b"--frames", b"0", b"--against", b"x\xff.ply"]);
+        run(&[b"compare", file, b"--path", b"p\xff.path", b"--out", b"c\xff"]);
+    }
+    run(&[b"path", b"info", b"p\xff.path"]);
+    let report =
+        std::fs::read_to_string(place.file("").join(OsStr::from_bytes(b"c\xff/report.html"))).unwrap();
+    assert!(report.contains("--path p\u{fffd}.path --out c\u{fffd}"), "the command is shown");
+}

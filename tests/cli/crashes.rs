@@ -114,10 +114,7 @@ fn a_killed_comparison_leaves_its_results_whole() {
 #[test]
 fn an_interrupted_comparison_writes_what_was_finished() {
     let place = place();
-    let frames: String =
-        (0..4_000).map(|i| format!("{i} 0.5 0.5 {} 0 0 0 1\n", 1.0 + f64::from(i % 100) / 100.0)).collect();
-    let header = "# foldfront path\n# name long\n# units m\n# fov 60\n# aspect 1.5\n";
-    place.write("long.path", format!("{header}{frames}"));
+    place.write("long.path", long_path(20_000));
     let mut command = place.command(
         "compare waves.ply --backend mt-partition --path descent.path --path long.path --pixels 0.2 --out results",
     );
@@ -137,4 +134,84 @@ fn an_interrupted_comparison_writes_what_was_finished() {
     let text = place.text("results/summary.csv");
     let runs = csv::Reader::from_reader(text.as_bytes()).records().count();
     assert!((4..8).contains(&runs), "{runs} runs: {text}");
+}
+
+/// A path that takes a while.
+fn long_path(frames: u32) -> String {
+    let at = |i: u32| f64::from(i % 200) / 200.0;
+    let frames = (0..frames).map(|i| format!("{i} {} 0.5 {} 0 0 0 1\n", at(i), 0.3 + at(7 * i)));
+    let header = "# foldfront path\n# name long\n# units m\n# fov 60\n# aspect 1.5\n";
+    frames.fold(header.to_owned(), |text, frame| text + &frame)
+}
+
+/// A file that is cut short, written over or removed while it is replayed: an error or faults, or nothing if it was not needed any
+/// more, and never the end of the process.
+#[test]
+fn files_may_change_under_a_replay() {
+    type Change = fn(&Workplace, &str);
+    let changes: [(&str, Change); 4] = [
+        ("cut to nothing", |place, file| place.write(file, "")),
+        ("cut in half", |place, file| {
+            let half = place.read(file).len() as u64 / 2;
+            std::fs::OpenOptions::new().write(true).open(place.file(file)).unwrap().set_len(half).unwrap();
+        }),
+        ("written over", |place, file| {
+            let length = place.read(file).len();
+            place.write(file, vec![0x5a; length]);
+        }),
+        ("removed", |place, file| std::fs::remove_file(place.file(file)).unwrap()),
+    ];
+    let place = place();
+    place.write("long.path", long_path(3_000));
+    for (backend, file) in [("meta-node", "x.meta"), ("detail-block", "x.xfm"), ("mt-partition", "x.mt")] {
+        place.succeed(&format!("build waves.ply --backend {backend} -o {file}"));
+        let intact = place.read(file);
+        for (name, change) in changes {
+            place.write(file, &intact);
+            let command = format!(
+                "compare {file} --path long.path --pixels 0.5 --page-memory 200K --strategy event --out results"
+            );
+            let mut child =
+                place.command(&command).stderr(Stdio::piped()).stdout(Stdio::null()).spawn().unwrap();
+            std::thread::sleep(Duration::from_millis(60));
+            let was_running = child.try_wait().unwrap().is_none();
+            change(&place, file);
+            let output = child.wait_with_output().unwrap();
+            let complaint = String::from_utf8_lossy(&output.stderr);
+            assert!(was_running, "{file}, {name}: it had ended before");
+            match output.status.code() {
+                Some(0) => assert_eq!(complaint, "", "{file}, {name}"),
+                Some(1) => assert!(
+                    complaint.lines().count() == 1 && complaint.contains(file),
+                    "{file}, {name}: {complaint}"
+                ),
+                code => panic!("{file}, {name}: exit {code:?}: {complaint}"),
+            }
+        }
+    }
+}
+
+/// Two processes over one file see the same.
+#[test]
+fn two_processes_over_one_file() {
+    let place = place();
+    place.write("long.path", long_path(300));
+    for (backend, file) in [("meta-node", "x.meta"), ("detail-block", "x.xfm"), ("mt-partition", "x.mt")] {
+        place.succeed(&format!("build waves.ply --backend {backend} -o {file}"));
+        let start = |out: &str| {
+            let command = format!("compare {file} --path long.path --strategy front --out {out}");
+            place.command(&command).stdout(Stdio::null()).spawn().unwrap()
+        };
+        for mut child in [start("one"), start("other")] {
+            assert!(child.wait().unwrap().success(), "{file}");
+        }
+        let cuts = ["one", "other"].map(|out| {
+            let text = place.text(&format!("{out}/frames.csv"));
+            let mut rows = csv::Reader::from_reader(text.as_bytes());
+            let column = rows.headers().unwrap().iter().position(|name| name == "cut_hash").unwrap();
+            rows.records().map(|row| row.unwrap()[column].to_owned()).collect::<Vec<_>>()
+        });
+        assert_eq!(cuts[0].len(), 300);
+        assert_eq!(cuts[0], cuts[1], "{file}");
+    }
 }

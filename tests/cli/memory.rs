@@ -120,3 +120,28 @@ fn an_interrupt_leaves_nothing() {
     assert_eq!(String::from_utf8_lossy(&output.stderr), "foldfront: interrupted\n");
     assert_eq!(place.everything(), before);
 }
+
+/// A limit on page memory that is too small is refused by every backend in the same words, before anything is written; and no more
+/// is loaded than it allows, whatever is looked at.
+#[test]
+fn page_memory_is_a_limit() {
+    let place = with_large(100);
+    for (backend, file) in [("meta-node", "x.meta"), ("detail-block", "x.xfm"), ("mt-partition", "x.mt")] {
+        place.succeed(&format!("build large.ply --backend {backend} -o {file}"));
+        place.fail(
+            &format!("compare {file} --page-memory 1K --out results"),
+            1,
+            &[file, "1024 bytes of page memory are too few: a single change needs "],
+        );
+        // Without a path, there is a flight around what is seen of it as a whole.
+        place.succeed(&format!(
+            "compare {file} --page-memory 100K --frames 0..5 --strategy front --out results"
+        ));
+        let text = place.text("results/summary.csv");
+        let mut rows = csv::Reader::from_reader(text.as_bytes());
+        let peak = rows.headers().unwrap().iter().position(|name| name == "peak_resident_bytes").unwrap();
+        let peak: u64 = rows.records().next().unwrap().unwrap()[peak].parse().unwrap();
+        assert!((10 << 10..=100 << 10).contains(&peak), "{backend}: {peak} bytes at most");
+    }
+    place.fail("build large.ply -o out.fold --memory 1", 2, &["--memory", "at least 64K"]);
+}

@@ -79,6 +79,16 @@ pub enum FileError {
         /// Its name.
         section: &'static str,
     },
+    /// The memory allowed for pages can not hold what a single change of the front needs.
+    #[error("{file}: {allowed} bytes of page memory are too few: a single change needs {needed}")]
+    Memory {
+        /// The file or store.
+        file: String,
+        /// The limit that was asked for.
+        allowed: u64,
+        /// The least that would do.
+        needed: u64,
+    },
     /// The sections of the file are not what they should be.
     #[error("{file}: {source}")]
     Sections {
@@ -90,6 +100,14 @@ pub enum FileError {
 }
 
 impl FileError {
+    /// Fails if fewer bytes are allowed for pages of a file than are needed.
+    ///
+    /// # Errors
+    /// [`FileError::Memory`].
+    pub fn check_memory(file: &str, allowed: u64, needed: u64) -> Result<(), Self> {
+        if allowed < needed { Err(Self::Memory { file: file.to_owned(), allowed, needed }) } else { Ok(()) }
+    }
+
     /// Writing a file failed.
     #[must_use]
     pub fn write(path: &Path, source: io::Error) -> Self {

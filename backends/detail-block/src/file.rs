@@ -272,6 +272,13 @@ impl XfmFile {
         split_entry(self.index.entry(block))
     }
 
+    /// The least memory in which any change can be made: a block and two below it.
+    #[must_use]
+    pub fn least_memory(&self) -> u64 {
+        let largest = (0..self.header.blocks as u32).map(|block| self.nodes_in(block)).max();
+        largest.map_or(0, |nodes| 3 * resident_bytes(nodes))
+    }
+
     /// Bytes that all blocks together would take in memory.
     #[must_use]
     pub fn resident_bytes_of_all(&self) -> u64 {

@@ -13,6 +13,7 @@
 use std::sync::Arc;
 use std::time::Duration;
 
+use container::FileError;
 use vertex_tree::{
     Bounds, Hierarchy, MeshSink, NONE, NodeId, NormalCone, PageStats, Prefetch, Step, TreeError, VertexTree,
 };
@@ -40,8 +41,9 @@ impl XfmTree {
     /// A tree with every node folded.
     ///
     /// # Errors
-    /// If the I/O thread can not be started.
+    /// [`FileError::Memory`] if the hard quota is less than [`XfmFile::least_memory`], [`XfmError::Thread`].
     pub fn new(file: Arc<XfmFile>, settings: Settings) -> Result<Self, XfmError> {
+        FileError::check_memory(file.name(), settings.hard_quota, file.least_memory())?;
         let roots = file.roots().iter().map(|&(root, _)| root).collect();
         let paging = Paging::new(file, &settings)?;
         let foresees = settings.prefetch == Prefetch::Schedule && settings.io != Io::Blocking;

@@ -58,16 +58,6 @@ pub enum MetaNodeError {
         /// What is wrong with it.
         reason: &'static str,
     },
-    /// The memory allowed has no room for the place holders that a tree needs at least.
-    #[error("{given} bytes of page memory; {least} are needed for {holders} place holders")]
-    Memory {
-        /// As asked for.
-        given: u64,
-        /// The least.
-        least: u64,
-        /// That is so many place holders.
-        holders: u32,
-    },
     /// The thread that reads could not be started.
     #[error(transparent)]
     Thread(#[from] ThreadError),

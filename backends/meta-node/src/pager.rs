@@ -68,6 +68,7 @@ use std::collections::VecDeque;
 use std::sync::Arc;
 use std::time::Duration;
 
+use container::FileError;
 use page_store::{Arrival, Failures, NOW, Requests, Ticket};
 use rustc_hash::FxHashMap;
 use vertex_tree::{NONE, PageStats, Prefetch, TreeError, prefetch};
@@ -709,10 +710,7 @@ impl Pager {
     /// Sets how much memory the place holders may take. Less than now takes effect at once.
     pub fn set_page_memory(&mut self, bytes: u64) -> Result<(), MetaNodeError> {
         let largest = self.file.holder_bytes();
-        if bytes < largest * u64::from(LEAST_HOLDERS) {
-            let least = largest * u64::from(LEAST_HOLDERS);
-            return Err(MetaNodeError::Memory { given: bytes, least, holders: LEAST_HOLDERS });
-        }
+        FileError::check_memory(self.file.name(), bytes, self.file.least_memory())?;
         // Room for three that are not in use, even where all are.
         let all = match self.in_use {
             InUse::Printed => largest.saturating_mul(self.file.header.pages.into()),

@@ -38,7 +38,8 @@ impl MetaNodeTree {
     /// A tree with every node folded. With the paper's prefetching the root pages have been asked for.
     ///
     /// # Errors
-    /// [`MetaNodeError::Memory`], [`MetaNodeError::Thread`].
+    /// [`FileError::Memory`](crate::FileError::Memory) if that is less than [`MetaNodeFile::least_memory`],
+    /// [`MetaNodeError::Thread`].
     pub fn new(file: Arc<MetaNodeFile>, settings: Settings) -> Result<Self, MetaNodeError> {
         let (slot_bits, leaves) = (file.header.slot_bits, file.header.leaves);
         let roots = file.roots.iter().map(|root| root.node).collect();
@@ -69,7 +70,7 @@ impl MetaNodeTree {
     /// those first that are of least use.
     ///
     /// # Errors
-    /// [`MetaNodeError::Memory`], and nothing has changed.
+    /// [`FileError::Memory`](crate::FileError::Memory), and nothing has changed.
     pub fn set_page_memory(&mut self, bytes: u64) -> Result<(), MetaNodeError> {
         self.pager.set_page_memory(bytes)
     }

@@ -55,12 +55,4 @@ pub enum MtError {
         /// How much.
         value: u64,
     },
-    /// The memory allowed can not hold what a single change of the front needs.
-    #[error("{allowed} bytes of memory are too few: a single change of the front needs {needed}")]
-    Memory {
-        /// The limit that was asked for.
-        allowed: u64,
-        /// The least that would do.
-        needed: u64,
-    },
 }

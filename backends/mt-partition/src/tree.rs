@@ -2,6 +2,7 @@
 
 use std::sync::Arc;
 
+use container::FileError;
 use vertex_tree::{
     Bounds, Hierarchy, MeshSink, NONE, NodeId, PageStats, Prefetch, Step, TreeError, VertexId, VertexTree,
 };
@@ -50,13 +51,10 @@ impl MtTree {
     /// A tree with every node folded.
     ///
     /// # Errors
-    /// [`MtError::Memory`] if the budget is below [`MtFile::least_memory`], [`MtError::Thread`] if a thread can not be had.
+    /// [`FileError::Memory`] if the budget is below [`MtFile::least_memory`], [`MtError::Thread`] if a thread can not be had.
     pub fn new(file: Arc<MtFile>, settings: Settings) -> Result<Self, MtError> {
         let Settings { cache, memory, reader, prefetch } = settings;
-        let (allowed, needed) = (memory.limit(), file.least_memory());
-        if allowed < needed {
-            return Err(MtError::Memory { allowed, needed });
-        }
+        FileError::check_memory(file.name(), memory.limit(), file.least_memory())?;
         let reader = reader.map_or_else(Reader::new, Ok)?;
         Ok(Self {
             paging: Paging::new(file.clone(), cache, prefetch, memory.clone(), &reader),

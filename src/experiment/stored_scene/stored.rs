@@ -142,7 +142,8 @@ impl StoredScene {
         let objects = self.paging_objects();
         let together = self.objects_of(Backend::MtPartition).max(1);
         let least = |file: &Store| match file {
-            Store::InMemory(..) | Store::DetailBlock(_) => 0,
+            Store::InMemory(..) => 0,
+            Store::DetailBlock(file) => file.least_memory().saturating_mul(objects),
             Store::MetaNode(file) => file.least_memory().saturating_mul(objects),
             Store::MtPartition(file) => file.least_memory().saturating_mul(objects).div_ceil(together),
         };

@@ -8,7 +8,7 @@ use foldfront::page_store::source::{Counted, Faults, Faulty, MemorySource, PageS
 use foldfront::selection::engine::Engine;
 use foldfront::selection::engine::Settings;
 use foldfront::vertex_tree::{MeshSink, NullSink};
-use mt_partition::{BuildOptions, CacheMode, Memory, MtError, MtFile, MtTree, Reader};
+use mt_partition::{BuildOptions, CacheMode, FileError, Memory, MtError, MtFile, MtTree, Reader};
 
 use super::{CRITERION, Walk, advance_settled, all_around, ball_log, engine};
 use crate::common::graph_cut::GraphCut;
@@ -82,7 +82,10 @@ fn less_than_that_is_refused() {
     let memory = Memory::new(file.least_memory() - 1);
     let settings = mt_partition::Settings { memory, ..mt_partition::Settings::default() };
     let error = MtTree::new(file.clone(), settings).unwrap_err();
-    assert!(matches!(error, MtError::Memory { needed, .. } if needed == file.least_memory()), "{error}");
+    assert!(
+        matches!(error, MtError::File(FileError::Memory { needed, .. }) if needed == file.least_memory()),
+        "{error}"
+    );
 }
 
 /// The limit goes down and up between frames; the tree follows at the end of the next one.

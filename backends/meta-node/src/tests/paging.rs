@@ -5,7 +5,7 @@ use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::{Duration, Instant};
 
 use crate::tests::common::{Front, bytes, frame, holder_bytes, random_log};
-use crate::{BuildOptions, InUse, MetaNodeError, MetaNodeFile, MetaNodeTree, Settings};
+use crate::{BuildOptions, FileError, InUse, MetaNodeError, MetaNodeFile, MetaNodeTree, Settings};
 use page_store::source::{Faults, Faulty, MemorySource, PageSource, Throttled};
 use rand::{RngExt, SeedableRng};
 use rand_pcg::Pcg64;
@@ -112,7 +112,11 @@ fn memory_may_change_between_frames() {
         }
     }
     let error = tree.set_page_memory(4 * each - 1).unwrap_err();
-    assert!(matches!(error, MetaNodeError::Memory { given, least, .. } if given + 1 == least), "{error}");
+    let is_named = |allowed: u64, needed| allowed + 1 == needed && needed == tree.file().least_memory();
+    assert!(
+        matches!(error, MetaNodeError::File(FileError::Memory { allowed, needed, .. }) if is_named(allowed, needed)),
+        "{error}"
+    );
 }
 
 /// The root page is there at all times after it has come: folding the last node is never refused.
