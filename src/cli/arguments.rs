@@ -11,7 +11,9 @@ use mt_partition::CacheMode;
 use page_store::Simulated;
 
 use super::say::Misunderstood;
-use super::values::{backend, cache, duration, frames, memory, positive, prefetch, size, strategy, work_cap};
+use super::values::{
+    backend, cache, duration, frames, memory, positive, prefetch, rate, size, strategy, work_cap,
+};
 use crate::experiment::compare::{Loading, Pace};
 use crate::experiment::path::import;
 use crate::experiment::store::{Backend, BuildOptions};
@@ -206,7 +208,7 @@ pub(super) struct Compare {
     pub prefetch: Vec<Loading>,
     /// Replay in real time at N frames a second, so that pages can be late: on virtual time, with a simulated store. By
     /// default each frame waits for its pages.
-    #[arg(long, value_name = "N", value_parser = positive)]
+    #[arg(long, value_name = "N", value_parser = rate)]
     pub fps: Option<f64>,
     /// Time from a read to its first byte [default: 5ms].
     #[arg(long, value_name = "TIME", value_parser = duration, requires = "fps", conflicts_with = "wall_clock")]

@@ -95,9 +95,15 @@ pub(super) fn compare(command: &Compare) -> Result<()> {
         files.push((at(&format!("selection-{}.svg", section.name)), curves.into_bytes()));
     }
     // Only now, so that a failure leaves what is there as it is.
+    let is_missing = |folder: &&FilePath| !folder.as_os_str().is_empty() && !folder.exists();
+    let made: Vec<&FilePath> = command.out.ancestors().take_while(is_missing).collect();
     std::fs::create_dir_all(&command.out).with_context(|| command.out.display().to_string())?;
     let written = output::write_all(files.iter().map(|(file, bytes)| (&**file, &**bytes)));
-    written.map_err(|(file, error)| anyhow::Error::new(error).context(file.display().to_string()))?;
+    if let Err((file, error)) = written {
+        // They are empty.
+        made.iter().for_each(|folder| drop(std::fs::remove_dir(folder)));
+        return Err(anyhow::Error::new(error).context(file.display().to_string()));
+    }
     print(&format!("{}\nThe report is in {}\n", report.to_text(), file.display()))?;
     if options.stop.is_some_and(|stop| stop.load(Ordering::Relaxed)) {
         bail!("interrupted: {} has what had been replayed to the end", command.out.display());

@@ -18,6 +18,14 @@ pub(super) fn positive(text: &str) -> Result<f64, String> {
     }
 }
 
+/// Frames a second, so many that their time can be told from none.
+pub(super) fn rate(text: &str) -> Result<f64, String> {
+    match positive(text) {
+        Ok(rate @ ..=1e6) => Ok(rate),
+        _ => Err("a number above 0, at most 1000000, is expected".to_owned()),
+    }
+}
+
 /// A number of bytes, or of units of 2^10, 2^20 or 2^30 bytes with the letter K, M or G.
 pub(super) fn size(text: &str) -> Result<u64, String> {
     match parse_size::Config::new().with_binary().parse_size(text) {
@@ -109,6 +117,7 @@ mod tests {
         assert_eq!(backend("meta-node"), Ok(Backend::MetaNode));
         assert_eq!(cache("p-cc"), Ok(CacheMode::PCc));
         assert!(positive("NaN").is_err());
+        assert_eq!((rate("0.1"), rate("1e6"), rate("1e300").is_err()), (Ok(0.1), Ok(1e6), true));
         assert_eq!(strategy("event"), Ok(Strategy::Event));
         assert!(strategy("best").is_err());
     }

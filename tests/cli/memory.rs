@@ -87,15 +87,26 @@ fn a_full_disk_is_an_error_and_leaves_nothing() {
         "build large.log -o out.xfm --backend detail-block --memory 1M",
         "build large.log -o out.mt --backend mt-partition --memory 1M",
     ] {
-        let program = env!("CARGO_BIN_EXE_foldfront");
-        // Files of 400 blocks of 512 bytes; the signal that comes with the error is not for the program.
-        let script = format!("trap '' XFSZ; ulimit -f 400; exec {program} {build}");
-        let command = place.command("");
-        let mut shell = std::process::Command::new("sh");
-        shell.args(["-c", &script]).current_dir(command.get_current_dir().unwrap());
-        place.fail_as(&mut shell, &script, 1, &["temporary files in .: ", "too large"]);
+        place.fail_as(&mut within(&place, 400, build), build, 1, &["temporary files in .: ", "too large"]);
         assert_eq!(place.everything(), before);
     }
+    // The report has pictures; the tables by themselves would fit, and are not written either.
+    let compare = "compare large.log --path descent.path --strategy front --out new/results";
+    place.fail_as(&mut within(&place, 100, compare), compare, 1, &["new/results/report.html: ", "too large"]);
+    std::fs::create_dir_all(place.file("new/results")).unwrap();
+    place.write("new/results/frames.csv", "written earlier");
+    place.fail_as(&mut within(&place, 100, compare), compare, 1, &["new/results/report.html: ", "too large"]);
+}
+
+/// The program, where no file may be longer than so many blocks of 512 bytes.
+#[cfg(unix)]
+fn within(place: &Workplace, blocks: u32, arguments: &str) -> std::process::Command {
+    let program = env!("CARGO_BIN_EXE_foldfront");
+    // The signal that comes with the error is not for the program.
+    let script = format!("trap '' XFSZ; ulimit -f {blocks}; exec {program} {arguments}");
+    let mut shell = std::process::Command::new("sh");
+    shell.args(["-c", &script]).current_dir(place.file(""));
+    shell
 }
 
 /// An interrupted build says so, and leaves neither its output nor anything temporary.

@@ -70,7 +70,8 @@ impl Path {
         Summary {
             frames: self.frames.len(),
             seconds: time(self.frames.last()) - time(self.frames.first()),
-            length: moving.iter().filter(|&&rho| rho <= teleport).sum(),
+            // Not `sum`, which is -0 of nothing.
+            length: moving.iter().filter(|&&rho| rho <= teleport).fold(0.0, |length, rho| length + rho),
             motion: self.motion_percentiles([50.0, 99.0, 100.0]),
             stops: steps
                 .chunk_by(|a, b| at_rest(a) == at_rest(b))
@@ -144,7 +145,8 @@ mod tests {
     #[test]
     fn a_single_frame_has_no_motion() {
         assert_eq!(path(&[]).motion_percentile(99.0), Motion::default());
-        assert_eq!(path(&[]).summary().frames, 1);
+        let summary = path(&[]).summary();
+        assert_eq!((summary.frames, summary.length.to_string()), (1, "0".to_owned()));
     }
 
     #[test]

@@ -101,13 +101,13 @@ pub enum ImportError {
         frames: usize,
     },
     /// The rate is not above 0 and at most [`MAX_RATE`].
-    #[error("{rate} frames a second are not above 0 and at most {MAX_RATE}")]
+    #[error("{rate:?} frames a second are not above 0 and at most {MAX_RATE}")]
     Rate {
         /// The rate.
         rate: f64,
     },
     /// The resampled trajectory would have more than [`MAX_FRAMES`] frames.
-    #[error("{}: {seconds} s at {rate} frames a second are more than {MAX_FRAMES} frames", file.display())]
+    #[error("{}: {seconds:?} s at {rate:?} frames a second are more than {MAX_FRAMES} frames", file.display())]
     TooLong {
         /// The trajectory.
         file: PathBuf,
