@@ -56,6 +56,13 @@ pub struct Outcome {
     pub faults: u64,
 }
 
+impl Outcome {
+    /// Whether nothing was wrong.
+    pub fn is_clean(&self) -> bool {
+        self.errors + self.faults == 0
+    }
+}
+
 /// Follows a walk. No more than so many triangles can be displayed at a time, or be left behind.
 pub fn follow<T: VertexTree>(tree: T, seed: u64, most: usize) -> Outcome {
     let mut random = seeded(seed);
