@@ -12,6 +12,7 @@
 
 use std::time::Duration;
 
+use rustc_hash::FxHashSet;
 use vertex_tree::{Bounds, Hierarchy, NodeId, NormalCone, PageStats, Refine, Step, TreeError};
 
 /// Waits inside of a change until what it needs has come. A change that still is refused then, as memory is too small for
@@ -24,6 +25,11 @@ pub struct Settled<T> {
     refused: Vec<NodeId>,
     /// How long changes have waited in this frame.
     stalled: Duration,
+    /// The first fault that waiting has come upon since somebody asked.
+    fault: Option<TreeError>,
+    /// Nodes that a fault has kept back for as long as anybody waits. From then on each is asked for once more in a frame: pages
+    /// that are damaged would otherwise be waited for as long in every frame, and for every node on them.
+    damaged: FxHashSet<NodeId>,
 }
 
 /// A change that is refused more often is left to the next frame.
@@ -39,7 +45,14 @@ impl<T: Hierarchy> Settled<T> {
     /// A backend that waits or, if it does not, is as it would be without this: so that what replays a path need not care.
     #[must_use]
     pub fn waiting(tree: T, waits: bool) -> Self {
-        Self { tree, waits, refused: Vec::new(), stalled: Duration::ZERO }
+        Self {
+            tree,
+            waits,
+            refused: Vec::new(),
+            stalled: Duration::ZERO,
+            fault: None,
+            damaged: FxHashSet::default(),
+        }
     }
 
     fn insist(
@@ -47,14 +60,28 @@ impl<T: Hierarchy> Settled<T> {
         node: NodeId,
         mut change: impl FnMut(&mut T) -> Result<Step, TreeError>,
     ) -> Result<Step, TreeError> {
-        for _ in 0..PATIENCE {
+        let is_known = !self.damaged.is_empty() && self.damaged.contains(&node);
+        let mut is_damaged = is_known;
+        for _ in 0..if is_known { 2 } else { PATIENCE } {
             match change(&mut self.tree)? {
                 Step::NotResident if self.waits => {
                     self.stalled += self.tree.settle()?;
                     self.tree.begin_frame(&mut Vec::new())?;
+                    if let Some(fault) = self.tree.take_fault() {
+                        is_damaged = true;
+                        self.fault.get_or_insert(fault);
+                    }
                 }
-                step => return Ok(step),
+                step => {
+                    if is_known {
+                        self.damaged.remove(&node);
+                    }
+                    return Ok(step);
+                }
             }
+        }
+        if is_damaged {
+            self.damaged.insert(node);
         }
         self.refused.push(node);
         Ok(Step::NotResident)
@@ -128,7 +155,7 @@ impl<T: Hierarchy> Hierarchy for Settled<T> {
         self.tree.settle()
     }
     fn take_fault(&mut self) -> Option<TreeError> {
-        self.tree.take_fault()
+        self.fault.take().or_else(|| self.tree.take_fault())
     }
     fn assert_well_formed(&self) {
         self.tree.assert_well_formed();

@@ -61,10 +61,8 @@ impl PageSource for FailsAt {
             (Failure::ForGood | Failure::BitForGood, _) | (_, Some(0)) | (Failure::Twice, Some(1)) => true,
             _ => false,
         };
-        if !is_hit {
-            return Ok(());
-        }
         match self.failure {
+            _ if !is_hit => Ok(()),
             Failure::Bit | Failure::BitForGood => {
                 let middle = buffer.len() / 2;
                 buffer[middle] ^= 4;

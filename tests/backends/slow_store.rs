@@ -27,7 +27,7 @@ const STORE: Simulated = Simulated { latency: Duration::from_millis(50), bandwid
 const FLIGHT: u32 = 60;
 
 fn log() -> CollapseLog {
-    let mesh = bumpy_grid(120, &mut seeded(7));
+    let mesh = bumpy_grid(120, &mut seeded(1));
     simplify::build(mesh, &simplify::Options::default(), &mut |_, _| ()).unwrap().0
 }
 

@@ -95,16 +95,17 @@ fn a_killed_comparison_leaves_its_results_whole() {
     let place = place();
     let command = "compare waves.ply --backend meta-node --path descent.path --strategy front --out results";
     let killed = kill(&place, command, |moment| {
-        let Ok(report) = std::fs::read(place.file("results/report.html")) else { return };
-        assert!(report.ends_with(b"</html>\n"), "{moment}");
-        for name in ["frames.csv", "summary.csv"] {
-            let text = place.text(&format!("results/{name}"));
-            let mut rows = csv::Reader::from_reader(text.as_bytes());
-            assert_eq!(
-                rows.records().filter(Result::is_ok).count(),
-                if name == "frames.csv" { 3 } else { 1 },
-                "{moment}"
-            );
+        if let Ok(report) = std::fs::read(place.file("results/report.html")) {
+            assert!(report.ends_with(b"</html>\n"), "{moment}");
+            for name in ["frames.csv", "summary.csv"] {
+                let text = place.text(&format!("results/{name}"));
+                let mut rows = csv::Reader::from_reader(text.as_bytes());
+                assert_eq!(
+                    rows.records().filter(Result::is_ok).count(),
+                    if name == "frames.csv" { 3 } else { 1 },
+                    "{moment}"
+                );
+            }
         }
     });
     assert!(killed > MOMENTS / 4, "only {killed} were killed");
@@ -162,7 +163,7 @@ fn files_may_change_under_a_replay() {
         ("removed", |place, file| std::fs::remove_file(place.file(file)).unwrap()),
     ];
     let place = place();
-    place.write("long.path", long_path(3_000));
+    place.write("long.path", long_path(1_500));
     for (backend, file) in [("meta-node", "x.meta"), ("detail-block", "x.xfm"), ("mt-partition", "x.mt")] {
         place.succeed(&format!("build waves.ply --backend {backend} -o {file}"));
         let intact = place.read(file);

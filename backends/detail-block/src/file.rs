@@ -332,6 +332,7 @@ impl XfmFile {
             ("nodes a block", format!("{fill:.2}")),
             ("bytes", h.length.to_string()),
             ("bytes a triangle", format!("{per_triangle:.2}")),
+            ("least page memory, bytes", self.least_memory().to_string()),
         ];
         facts.extend(self.georeference.facts());
         facts

@@ -70,7 +70,7 @@ fn a_bad_store_delays_and_no_more() {
 
 #[test]
 fn what_is_seen_from_behind_stays_coarse() {
-    crate::facing::what_is_seen_from_behind_stays_coarse(&data::log(meshes::ball(30, 0.0)), 3000.0, 20);
+    crate::facing::what_is_seen_from_behind_stays_coarse(&data::log(meshes::ball(30, 0.0)), 6000.0, 20);
     crate::facing::what_is_seen_from_behind_stays_coarse(
         &data::log(meshes::with_handles(0, 20)),
         40_000.0,
