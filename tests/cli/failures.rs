@@ -128,7 +128,8 @@ fn a_bad_trajectory_is_named_with_the_line_in_it() {
         place.fail(&format!("path import {trajectory} --fit grid.ply -o out.path"), 1, &[said]);
     }
     place.fail("path import descent.path --fit grid.ply -o out.path --rate 0", 2, &["'0'", "--rate"]);
-    place.fail("path import descent.path --fit grid.ply -o out.path --rate 1e9", 1, &["1000000000 frames"]);
+    place.fail("path import descent.path --fit grid.ply -o out.path --rate 1e9", 1, &["1000000000.0 frames"]);
+    place.fail("path import descent.path --fit grid.ply -o out.path --rate 1e300", 1, &["1e300 frames"]);
 }
 
 #[test]
