@@ -107,7 +107,7 @@ pub enum ImportError {
         rate: f64,
     },
     /// The resampled trajectory would have more than [`MAX_FRAMES`] frames.
-    #[error("{}: {seconds:?} s at {rate:?} frames a second are more than {MAX_FRAMES} frames", file.display())]
+    #[error("{}: {seconds:?} s at {rate} frames a second are more than {MAX_FRAMES} frames", file.display())]
     TooLong {
         /// The trajectory.
         file: PathBuf,
