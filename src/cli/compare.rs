@@ -2,7 +2,6 @@
 
 use std::ops::Range;
 use std::path::Path as FilePath;
-use std::sync::atomic::Ordering;
 
 use anyhow::{Context, Result, bail};
 use collapse_log::Mesh;
@@ -55,7 +54,7 @@ pub(super) fn compare(command: &Compare) -> Result<()> {
     let mut report = Report { command: made_by, pace: options.pace, sections: Vec::new() };
     for (input, name) in inputs.iter().zip(unique_names(&inputs)) {
         // What has been finished is to be written: then an interrupt waits for what goes on.
-        if options.stop.is_some_and(|stop| stop.load(Ordering::Relaxed)) {
+        if interrupt::is_raised() {
             break;
         }
         if report.sections.is_empty() {
@@ -105,7 +104,7 @@ pub(super) fn compare(command: &Compare) -> Result<()> {
         return Err(anyhow::Error::new(error).context(file.display().to_string()));
     }
     print(&format!("{}\nThe report is in {}\n", report.to_text(), file.display()))?;
-    if options.stop.is_some_and(|stop| stop.load(Ordering::Relaxed)) {
+    if interrupt::is_raised() {
         bail!("interrupted: {} has what had been replayed to the end", command.out.display());
     }
     match faults(runs) {

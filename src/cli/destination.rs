@@ -3,6 +3,7 @@
 use std::path::{Path, PathBuf};
 
 use anyhow::{Context, Result, bail, ensure};
+use container::output;
 use same_file::Handle;
 
 use crate::experiment::store::Backend;
@@ -64,11 +65,7 @@ pub(super) fn check_file(file: &Path, content: Content, inputs: &[PathBuf]) -> R
     // A rename would put a file in the place of /dev/null.
     ensure!(!file.exists() || file.is_file(), "{}: is not a file", name());
     refuse_input(file, inputs)?;
-    let folder = match file.parent() {
-        Some(parent) if !parent.as_os_str().is_empty() => parent,
-        _ => Path::new("."),
-    };
-    tempfile::tempfile_in(folder).with_context(name)?;
+    tempfile::tempfile_in(output::folder_of(file)).with_context(name)?;
     Ok(())
 }
 

@@ -6,7 +6,7 @@ use std::path::{Path, PathBuf};
 use anyhow::{Context, Result};
 use collapse_log::{CollapseLog, LogFile, Mesh, log_file_version, read_log};
 use container::temporary::Temporary;
-use container::{DegreeMap, Georeference};
+use container::{DegreeMap, Georeference, output};
 use serde_json::json;
 
 use super::arguments::{Build, Info, Verify};
@@ -48,12 +48,8 @@ pub(super) fn build(command: &Build) -> Result<()> {
 
 /// What `--memory` allows. From now on an interrupt is an error like any other.
 fn write_limits(memory: u64, command: &Build) -> WriteLimits<'static> {
-    let temporary = match (&command.temp, command.output.parent()) {
-        (Some(folder), _) => folder.clone(),
-        (None, Some(parent)) if !parent.as_os_str().is_empty() => parent.to_owned(),
-        _ => PathBuf::from("."),
-    };
-    WriteLimits { memory, temporary, stop: interrupt::end_well() }
+    let temporary = command.temp.as_deref().unwrap_or_else(|| output::folder_of(&command.output));
+    WriteLimits { memory, temporary: temporary.to_owned(), stop: interrupt::end_well() }
 }
 
 /// Writes the hierarchy of a log that may be larger than memory.

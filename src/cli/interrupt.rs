@@ -35,6 +35,11 @@ pub(super) fn flag() -> &'static AtomicBool {
     &INTERRUPTED
 }
 
+/// Whether it is.
+pub(super) fn is_raised() -> bool {
+    flag().load(Ordering::Relaxed)
+}
+
 /// Says that from now on it does not.
 pub(super) fn end_at_once() {
     ENDS_WELL.store(false, Ordering::Relaxed);

@@ -20,7 +20,6 @@ mod threads;
 mod values;
 
 use std::process::ExitCode;
-use std::sync::atomic::Ordering;
 
 use clap::Parser;
 use clap::error::ErrorKind;
@@ -67,7 +66,7 @@ pub fn main() -> ExitCode {
                 return ExitCode::SUCCESS;
             }
             complain(&failure_line(&error));
-            if interrupt::flag().load(Ordering::Relaxed) {
+            if interrupt::is_raised() {
                 return ExitCode::from(interrupt::EXIT_CODE);
             }
             if error.is::<Misunderstood>() { ExitCode::from(2) } else { ExitCode::FAILURE }

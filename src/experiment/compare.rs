@@ -329,7 +329,8 @@ impl Subject {
                 }
             }
         }
-        match self.compare(uncompared.clone(), &mut count) {
+        let places: Vec<usize> = uncompared.iter().map(|&(at, _)| at).collect();
+        match self.compare(uncompared, &mut count) {
             Ok(all) => {
                 for (at, wrong) in all {
                     runs[at].rows.iter_mut().zip(wrong).for_each(|(row, wrong)| row.wrong = Some(wrong));
@@ -337,7 +338,7 @@ impl Subject {
             }
             // What has not been compared is not finished.
             Err(CompareError::Interrupted) => {
-                uncompared.iter().rev().for_each(|&(at, _)| drop(runs.remove(at)));
+                places.iter().rev().for_each(|&at| drop(runs.remove(at)));
             }
             Err(error) => return Err(error),
         }

@@ -76,8 +76,9 @@ impl Written {
     }
 }
 
-/// The folder that a file is in.
-fn folder_of(path: &Path) -> &Path {
+/// The folder that a file is in, or would be.
+#[must_use]
+pub fn folder_of(path: &Path) -> &Path {
     match path.parent() {
         Some(parent) if !parent.as_os_str().is_empty() => parent,
         _ => Path::new("."),

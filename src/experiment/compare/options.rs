@@ -114,7 +114,7 @@ impl Default for Options {
 impl Options {
     /// Whether somebody wants the comparison to end.
     pub(super) fn is_stopped(&self) -> bool {
-        self.stop.is_some_and(|stop| stop.load(Ordering::Relaxed))
+        is_raised(self.stop)
     }
 
     /// How an engine refines along a path of this declared speed.
@@ -151,4 +151,9 @@ impl Options {
             kappa: 0.0,
         }
     }
+}
+
+/// Whether there is a flag by which a comparison is to end, and it is raised.
+pub(super) fn is_raised(stop: Option<&AtomicBool>) -> bool {
+    stop.is_some_and(|stop| stop.load(Ordering::Relaxed))
 }

@@ -1,7 +1,7 @@
 //! One strategy along one path.
 
 use std::ops::Range;
-use std::sync::atomic::{AtomicBool, Ordering};
+use std::sync::atomic::AtomicBool;
 use std::time::{Duration, Instant};
 
 use vertex_tree::{Hierarchy, NodeId, NullSink, Refine, TreeError, VertexTree};
@@ -9,7 +9,7 @@ use vertex_tree::{Hierarchy, NodeId, NullSink, Refine, TreeError, VertexTree};
 use super::error::{CompareError, WrongCut};
 use super::loading::Loading;
 use super::opening::Opening;
-use super::options::Pace;
+use super::options::{Pace, is_raised};
 use super::run::{Check, Measured, Row, Run};
 use crate::experiment::path::Path;
 use selection::active_mesh::ActiveMesh;
@@ -30,7 +30,6 @@ pub struct Named<'a> {
     pub has_dependencies: bool,
 }
 
-#[derive(Clone)]
 pub(super) struct Replay<'a> {
     pub named: Named<'a>,
     pub path: &'a Path,
@@ -77,7 +76,7 @@ impl Replay<'_> {
         // While a frame waits for the store the path does not go on.
         let mut stalled = Duration::ZERO;
         for (at, (frame, view)) in self.frames.clone().zip(self.views).enumerate() {
-            if self.stop.is_some_and(|stop| stop.load(Ordering::Relaxed)) {
+            if is_raised(self.stop) {
                 return Err(CompareError::Interrupted);
             }
             let views = std::slice::from_ref(view);

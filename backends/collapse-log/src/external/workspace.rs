@@ -17,8 +17,7 @@ impl<'a> Workspace<'a> {
     /// As much memory as serves, and temporary files beside `output`.
     #[must_use]
     pub fn beside(output: &Path, stop: &'a AtomicBool) -> Self {
-        let folder =
-            output.parent().filter(|folder| !folder.as_os_str().is_empty()).unwrap_or(Path::new("."));
+        let folder = container::output::folder_of(output);
         Self { folder: folder.to_owned(), memory: u64::MAX, stop }
     }
 
