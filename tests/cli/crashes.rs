@@ -117,16 +117,16 @@ fn an_interrupted_comparison_writes_what_was_finished() {
     let place = place();
     place.write("long.path", long_path(20_000));
     let mut command = place.command(
-        "compare waves.ply --backend mt-partition --path descent.path --path long.path --pixels 0.2 --out results",
+        "compare waves.ply --backend mt-partition --path descent.path --path long.path --fps 100 --wall-clock --out results",
     );
     command.env("TMPDIR", place.file("temporary")).stderr(Stdio::piped()).stdout(Stdio::null());
     let (begun, child) = (Instant::now(), command.spawn().unwrap());
-    // Once its hierarchy is written, it takes far less than this for the short path, and more for the long one.
+    // By the clock, the short path takes a few hundredths of a second and the long one minutes, on whatever machine.
     while place.names("temporary").is_empty() {
         assert!(begun.elapsed() < Duration::from_secs(120), "nothing is built");
         std::thread::sleep(Duration::from_millis(5));
     }
-    std::thread::sleep(Duration::from_millis(1500));
+    std::thread::sleep(Duration::from_millis(3000));
     let pid = child.id().to_string();
     assert!(std::process::Command::new("kill").args(["-INT", &pid]).status().unwrap().success());
     let output = child.wait_with_output().unwrap();
@@ -138,7 +138,7 @@ fn an_interrupted_comparison_writes_what_was_finished() {
     assert_eq!(place.names("temporary"), [""; 0]);
     let text = place.text("results/summary.csv");
     let runs = csv::Reader::from_reader(text.as_bytes()).records().count();
-    assert!((4..8).contains(&runs), "{runs} runs: {text}");
+    assert_eq!(runs, 4, "{text}");
 }
 
 /// A path that takes a while.
