@@ -30,7 +30,7 @@ use crate::front::Front;
 use crate::in_play::{Kind, Slot};
 use crate::motion::{Odometer, Speed};
 use crate::normal_cone::Cones;
-use crate::refine::{Finder, Flips, Frame, Strategy, Watch, with_strategy};
+use crate::refine::{Finder, Flips, Frame, Strategy, Watch};
 use crate::view::{View, check_origin};
 use crate::waiting::Waiting;
 
@@ -214,7 +214,7 @@ impl<T: Refine<S>, S> Engine<T, S> {
             cones: None,
         };
         for root in front.roots() {
-            with_strategy!(&mut finder, |s| s.watch(&frame, root, Kind::Unfold, front.bounds(root)));
+            finder.watch(&frame, root, Kind::Unfold, front.bounds(root));
         }
         tree.start(&mut sink)?;
         Ok(Self {
@@ -371,29 +371,27 @@ impl<T: Refine<S>, S> Engine<T, S> {
         self.finder.find(&frame, &self.before, &self.front, &mut self.flips);
 
         let found = Moment::now(self.settings.clock);
-        let (applied, counts, tests) = with_strategy!(&mut self.finder, |finder| {
-            let mut step = Steps {
-                tree: &mut self.tree,
-                sink: &mut self.sink,
-                front: &mut self.front,
-                finder,
-                frame: &frame,
-                stack: &mut self.stack,
-                missing: &mut self.missing,
-                waiting: &mut self.waiting,
-                carried: &mut self.carried,
-                blocked: &mut self.blocked,
-                forbidden: &mut self.forbidden,
-                still_needed: &mut self.still_needed,
-                folding: &mut self.folding,
-                unfolding: &mut self.unfolding,
-                ready: &mut self.ready,
-                counts: Counts::default(),
-                tests: 0,
-            };
-            let applied = step.carry_out(&self.flips, &mut self.arrived, self.settings.work_cap, found);
-            (applied, step.counts, self.flips.tests + step.tests)
-        });
+        let mut step = Steps {
+            tree: &mut self.tree,
+            sink: &mut self.sink,
+            front: &mut self.front,
+            finder: &mut self.finder,
+            frame: &frame,
+            stack: &mut self.stack,
+            missing: &mut self.missing,
+            waiting: &mut self.waiting,
+            carried: &mut self.carried,
+            blocked: &mut self.blocked,
+            forbidden: &mut self.forbidden,
+            still_needed: &mut self.still_needed,
+            folding: &mut self.folding,
+            unfolding: &mut self.unfolding,
+            ready: &mut self.ready,
+            counts: Counts::default(),
+            tests: 0,
+        };
+        let applied = step.carry_out(&self.flips, &mut self.arrived, self.settings.work_cap, found);
+        let (counts, tests) = (step.counts, self.flips.tests + step.tests);
         self.tree.finish(&mut self.sink);
         let distinct = |nodes: &mut Vec<NodeId>| {
             nodes.sort_unstable();

@@ -64,17 +64,13 @@ pub(crate) enum Finder {
 macro_rules! with_strategy {
     ($finder:expr, |$strategy:ident| $body:expr) => {
         match $finder {
-            $crate::refine::Finder::TopDown($strategy) => $body,
-            $crate::refine::Finder::Front($strategy) => $body,
-            $crate::refine::Finder::Event($strategy) => {
-                let $strategy = &mut **$strategy;
-                $body
-            }
-            $crate::refine::Finder::Published($strategy) => $body,
+            Finder::TopDown($strategy) => $body,
+            Finder::Front($strategy) => $body,
+            Finder::Event($strategy) => $body,
+            Finder::Published($strategy) => $body,
         }
     };
 }
-pub(crate) use with_strategy;
 
 impl Finder {
     pub fn new(strategy: Strategy) -> Self {
@@ -127,6 +123,34 @@ impl Finder {
             Self::Front(s) => s.assert_well_formed(),
             Self::Event(s) => s.assert_well_formed(),
         }
+    }
+}
+
+/// A branch for each call, always the same way: the part of the engine that carries out changes is compiled once for a tree
+/// and a sink, and not once more for each strategy.
+impl Watch for Finder {
+    #[inline]
+    fn watch(&mut self, frame: &Frame, slot: Slot, kind: Kind, bounds: Bounds) {
+        with_strategy!(self, |s| s.watch(frame, slot, kind, bounds));
+    }
+
+    #[inline]
+    fn unwatch(&mut self, slot: Slot) {
+        with_strategy!(self, |s| s.unwatch(slot));
+    }
+
+    #[inline]
+    fn changed(&mut self, slot: Slot) {
+        with_strategy!(self, |s| s.changed(slot));
+    }
+
+    fn refused(&mut self, slot: Slot, kind: Kind, bounds: Bounds) {
+        with_strategy!(self, |s| s.refused(slot, kind, bounds));
+    }
+
+    #[inline]
+    fn prefetch(&self, slot: Slot) {
+        with_strategy!(self, |s| s.prefetch(slot));
     }
 }
 

@@ -60,7 +60,7 @@ enum Folds {
     AtMost(u64),
 }
 
-impl<T: Refine<S>, S, F: Watch> Steps<'_, T, S, F> {
+impl<T: Refine<S>, S> Steps<'_, T, S> {
     /// Folds and unfolds, and whatever follows, within a cap. `start` is when the work began.
     pub(super) fn apply_within(&mut self, cap: WorkCap, start: Moment) -> Result<(), TreeError> {
         self.carried.begin_frame(self.frame.motion != Motion::Rest);
@@ -252,7 +252,7 @@ impl<T: Refine<S>, S, F: Watch> Steps<'_, T, S, F> {
 }
 
 /// Whether a node that was noted can still change that way.
-fn is_due<T, S, F>(steps: &Steps<'_, T, S, F>, kind: Kind, noted: Noted) -> bool {
+fn is_due<T, S>(steps: &Steps<'_, T, S>, kind: Kind, noted: Noted) -> bool {
     match kind {
         Kind::Fold => is_collapsible(steps.front, noted),
         Kind::Unfold => is_boundary(steps.front, noted),

@@ -11,7 +11,7 @@ use crate::carried::Carried;
 use crate::clock::Moment;
 use crate::front::{Front, Record};
 use crate::in_play::{Kind, Slot};
-use crate::refine::{Flips, Frame, Watch};
+use crate::refine::{Finder, Flips, Frame, Watch};
 use crate::waiting::Waiting;
 
 /// Counts of the frame under way.
@@ -30,11 +30,11 @@ const TOGETHER: usize = 8;
 const MOST_STEPS: usize = 8;
 
 /// Carries out status changes and what follows from them.
-pub(super) struct Steps<'a, T, S, F> {
+pub(super) struct Steps<'a, T, S> {
     pub tree: &'a mut T,
     pub sink: &'a mut S,
     pub front: &'a mut Front,
-    pub finder: &'a mut F,
+    pub finder: &'a mut Finder,
     pub frame: &'a Frame<'a>,
     pub stack: &'a mut Vec<Pending>,
     /// Nodes whose page is missing for a change; some more than once.
@@ -59,7 +59,7 @@ pub(super) struct Steps<'a, T, S, F> {
     pub tests: u64,
 }
 
-impl<T: Refine<S>, S, F: Watch> Steps<'_, T, S, F> {
+impl<T: Refine<S>, S> Steps<'_, T, S> {
     /// Carries out what a strategy has found and what has waited for `arrived`, within a cap on work that began at `start`.
     pub fn carry_out(
         &mut self,

@@ -8,9 +8,8 @@ use vertex_tree::{NodeId, Refine, Step, TreeError};
 use super::changes::Steps;
 use super::noted::{Noted, Pending, is_boundary};
 use crate::in_play::{Kind, Slot};
-use crate::refine::Watch;
 
-impl<T: Refine<S>, S, F: Watch> Steps<'_, T, S, F> {
+impl<T: Refine<S>, S> Steps<'_, T, S> {
     /// Unfolds what waits on the stack, from the top.
     #[cold]
     pub(super) fn unfold_needed(&mut self) -> Result<(), TreeError> {

@@ -17,7 +17,7 @@ use crate::waiting::{Change, Waiting};
 /// How far ahead records are read into the cache.
 const AHEAD: usize = 8;
 
-impl<T: Refine<S>, S, F: Watch> Steps<'_, T, S, F> {
+impl<T: Refine<S>, S> Steps<'_, T, S> {
     /// Sets a change aside that the backend has refused for want of the page of `awaited`.
     pub(super) fn wait_for(&mut self, (slot, node): Noted, kind: Kind, awaited: NodeId) {
         self.missing.push(awaited);

@@ -97,7 +97,7 @@ impl<'a> Follower<'a> {
     fn watch_roots(&mut self, frame: &Frame) {
         for root in self.front.roots() {
             let bounds = self.front.bounds(root);
-            with_strategy!(&mut self.finder, |s| s.watch(frame, root, Kind::Unfold, bounds));
+            self.finder.watch(frame, root, Kind::Unfold, bounds);
         }
     }
 
@@ -133,16 +133,14 @@ impl<'a> Follower<'a> {
                     Kind::Fold => self.front.set_folded(self.roots, slot),
                 }
                 let other = if kind == Kind::Fold { Kind::Unfold } else { Kind::Fold };
-                with_strategy!(&mut self.finder, |s| {
-                    s.prefetch(slot);
-                    if is_refused {
-                        s.unwatch(slot);
-                        s.refused(slot, kind, bounds);
-                    } else {
-                        s.changed(slot);
-                        s.watch(frame, slot, other, bounds);
-                    }
-                });
+                self.finder.prefetch(slot);
+                if is_refused {
+                    self.finder.unwatch(slot);
+                    self.finder.refused(slot, kind, bounds);
+                } else {
+                    self.finder.changed(slot);
+                    self.finder.watch(frame, slot, other, bounds);
+                }
             }
         }
         let tests = tests - 5 + self.finder.settle(frame);

@@ -5,8 +5,8 @@ use vertex_tree::Bounds;
 use super::frame::Frame;
 use crate::in_play::{Kind, Slot};
 
-/// A strategy's state, as the part of the engine that carries out changes sees it: that is compiled for each strategy
-/// apart, since several of these calls are made for every change.
+/// A strategy's state, as the part of the engine that carries out changes sees it. Several of these calls are made for every
+/// change.
 ///
 /// The engine tells of every node that becomes or ceases to be a boundary node or collapsible, so that a strategy can
 /// watch just these.
