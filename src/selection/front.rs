@@ -13,10 +13,9 @@ mod graph;
 mod well_formed;
 
 use slab::Slab;
-use vertex_tree::{Bounds, Hierarchy, NONE, NodeId, prefetch};
+use vertex_tree::{Bounds, Hierarchy, NONE, NodeId, SparseTable, prefetch};
 
 use crate::in_play::{Kind, Slot};
-use crate::slot_table::SlotTable;
 
 /// A node's record: half a cache line.
 #[derive(Clone, Copy)]
@@ -90,7 +89,7 @@ pub struct Front {
     roots: Vec<u32>,
     root_slots: Vec<(NodeId, Slot)>,
     /// For each node in play, its slot. Kept only for graphs: in a tree, what is linked says it all.
-    slots: Option<SlotTable>,
+    slots: Option<SparseTable<Slot>>,
     /// A bit for each node that is active. Kept only for graphs.
     active_bits: Vec<u64>,
     active: usize,
@@ -108,7 +107,7 @@ impl Front {
             spare: Vec::new(),
             roots: Vec::new(),
             root_slots: Vec::new(),
-            slots: (!T::IS_TREE).then(|| SlotTable::new(tree.node_limit())),
+            slots: (!T::IS_TREE).then(|| SparseTable::new(tree.node_limit())),
             active_bits: if T::IS_TREE {
                 Vec::new()
             } else {
@@ -280,7 +279,7 @@ impl Front {
     /// Where a node of a graph is.
     #[inline(always)]
     fn slot_of(&self, node: NodeId) -> Slot {
-        self.slots.as_ref().map_or(Slot::NONE, |slots| slots.get(node))
+        self.slots.as_ref().map_or(Slot::NONE, |slots| slots.get(node.0))
     }
 
     /// Where a node is; [`Slot::NONE`] if it is not in play. In a tree this follows the links from the node's root down.
@@ -322,7 +321,7 @@ impl Front {
         };
         if let Some(slots) = &mut self.slots {
             for (slot, (node, _)) in (2 * pair..).zip(nodes.into_iter().flatten()) {
-                slots.insert(node, Slot(slot));
+                slots.set(node.0, Slot(slot));
             }
         }
         pair
@@ -333,7 +332,7 @@ impl Front {
         if let Some(slots) = &mut self.slots {
             for record in self.pairs[pair as usize].0 {
                 if record.node.0 != NONE {
-                    slots.remove(record.node);
+                    slots.set(record.node.0, Slot::NONE);
                 }
             }
         }

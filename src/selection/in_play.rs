@@ -1,7 +1,7 @@
 //! How nodes in play are named (see [`front`](crate::front)), and the changes that they wait for.
 
 /// Where the record of a node in play is. Used again when the node has gone out of play.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, PartialOrd, Ord, Hash)]
 #[repr(transparent)]
 pub struct Slot(pub u32);
 

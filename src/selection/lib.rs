@@ -26,7 +26,6 @@ mod packed;
 pub mod queue;
 pub mod refine;
 pub mod settled;
-mod slot_table;
 pub mod view;
 mod waiting;
 

@@ -161,3 +161,64 @@ fn page_memory_is_a_limit() {
     }
     place.fail("build large.ply -o out.fold --memory 1", 2, &["--memory", "at least 64K"]);
 }
+
+/// Over a file that is 30 times the limit, the process takes no more than what it takes over a tiny one, the limit, 16 bytes a
+/// page, 4 bytes a node, 256 bytes a displayed triangle for front, mesh and queue, and a megabyte for what is being read.
+#[cfg(target_os = "linux")]
+#[test]
+fn resident_memory_keeps_to_the_limit() {
+    let place = with_large(400);
+    place.succeed("build large.ply -o large.log");
+    for backend in ["meta-node", "detail-block", "mt-partition"] {
+        place.succeed(&format!("build large.log --backend {backend} -o large.{backend}"));
+        place.succeed(&format!("build grid.ply --backend {backend} -o tiny.{backend}"));
+        let length = place.file(&format!("large.{backend}")).metadata().unwrap().len();
+        let facts = place.succeed(&format!("info large.{backend}"));
+        let fact = |name: &str| -> u64 {
+            let line = facts.lines().find(|line| line.starts_with(&format!("{name}  ")));
+            line.map_or(0, |line| line[name.len()..].split_whitespace().next().unwrap().parse().unwrap())
+        };
+        let pages = ["pages", "detail blocks", "partitions"].map(fact).iter().sum::<u64>();
+        let nodes = fact("nodes").max(fact("collapses"));
+        assert!(pages > 1000, "{facts}");
+        let run = |size: &str, memory: &str| {
+            let options = "--strategy event --frames 0..240 --pixels 8 --out results";
+            peak(place.command(&format!("compare {size}.{backend} {options} {memory}")))
+        };
+        let displayed = || -> u64 {
+            let text = place.text("results/frames.csv");
+            let mut rows = csv::Reader::from_reader(text.as_bytes());
+            let at = rows.headers().unwrap().iter().position(|name| name == "triangles").unwrap();
+            rows.records().map(|row| row.unwrap()[at].parse().unwrap()).max().unwrap()
+        };
+        let limit = length / 30;
+        let (tiny, limited) = (run("tiny", ""), run("large", &format!("--page-memory {limit}")));
+        let most = tiny + limit + 16 * pages + 4 * nodes + 256 * displayed() + (1 << 20);
+        println!(
+            "{backend}: {length} bytes, {tiny} over a tiny file, {limited} within {limit}, at most {most}"
+        );
+        assert!(limited <= most, "{backend}: {limited} bytes within {limit}, {tiny} over a tiny file");
+        let whole = run("large", "");
+        assert!(whole > most, "{backend}: {whole} bytes without a limit: nothing is kept out");
+    }
+}
+
+/// The most memory that is resident at a time while a program runs, in bytes.
+#[cfg(target_os = "linux")]
+fn peak(mut command: std::process::Command) -> u64 {
+    let mut child = command.stdout(std::process::Stdio::null()).spawn().unwrap();
+    let status = format!("/proc/{}/status", child.id());
+    let mut peak = 0;
+    loop {
+        let ended = child.try_wait().unwrap();
+        let text = std::fs::read_to_string(&status).unwrap_or_default();
+        let line = text.lines().find_map(|line| line.strip_prefix("VmHWM:"));
+        let kilobytes = line.and_then(|line| line.split_whitespace().next()?.parse::<u64>().ok());
+        peak = peak.max(1024 * kilobytes.unwrap_or(0));
+        if let Some(ended) = ended {
+            assert!(ended.success() && peak > 0);
+            break peak;
+        }
+        std::thread::sleep(Duration::from_millis(2));
+    }
+}

@@ -8,21 +8,18 @@ use vertex_tree::{Bounds, NONE, NodeId};
 
 use super::error::MtError;
 use crate::format::{Header, NODE, PARTITION, ROOT};
+use crate::layout::Layout;
 use crate::opening::{Opener, words};
 use crate::record::{Limits, Record};
 
-/// A file, opened. Its tables stay in memory, about 16 bytes a node, and with them the base mesh; shared between trees.
+/// A file, opened. Its tables stay in memory, about 6 bytes a node and 12 a partition, and with them the base mesh; shared between
+/// trees.
 pub struct MtFile {
     source: Arc<dyn PageSource>,
     pub(crate) header: Header,
     pub(crate) roots: Vec<NodeId>,
     root_bounds: Vec<Bounds>,
-    /// First node of each partition, and one entry more: the number of nodes.
-    pub(crate) partitions: Vec<u32>,
-    /// The partition of each node.
-    partition_of: Vec<u32>,
-    /// Where each node's record starts, and one entry more: where the last one ends.
-    offsets: Vec<u64>,
+    pub(crate) layout: Layout,
     pub(crate) log_numbers: Vec<u32>,
     pub(crate) base: Record,
     /// The nodes that arcs of the source lead to, each with the position of that arc, in the order of the nodes.
@@ -66,7 +63,6 @@ impl MtFile {
     pub fn open(source: Arc<dyn PageSource>) -> Result<Self, MtError> {
         let opener = Opener { source: &*source };
         let header = opener.header()?;
-        let nodes = header.nodes as usize;
         let tables = opener.tables(&header)?;
         let (start, table) = &tables.roots;
         let mut roots = Vec::with_capacity(header.roots as usize);
@@ -97,26 +93,15 @@ impl MtFile {
         {
             return Err(range(*start, "first node of a partition", pair[0]));
         }
-        // The first is 0, the last the number of nodes, so this adds up.
-        let partition_of = (0..)
-            .zip(partitions.windows(2))
-            .flat_map(|(p, pair)| std::iter::repeat_n(p, (pair[1] - pair[0]) as usize))
-            .collect();
         let (start, table) = &tables.nodes;
-        let mut offsets = Vec::with_capacity(nodes + 1);
-        let mut log_numbers = Vec::with_capacity(nodes);
-        let mut end = tables.records_at;
-        offsets.push(end);
-        for entry in table.chunks_exact(NODE as usize) {
-            let [length, log_number] = words(entry);
-            if u64::from(log_number) >= header.collapses {
-                return Err(range(*start, "number in the log", log_number));
-            }
-            // At most 2^32 lengths below 2^32, on top of a source that is shorter than the file.
-            end += u64::from(length);
-            offsets.push(end);
-            log_numbers.push(log_number);
+        let entries = || table.chunks_exact(NODE as usize).map(words::<2>);
+        let log_numbers: Vec<u32> = entries().map(|[_, log_number]| log_number).collect();
+        if let Some(&log_number) = log_numbers.iter().find(|&&n| u64::from(n) >= header.collapses) {
+            return Err(range(*start, "number in the log", log_number));
         }
+        // The first is 0, the last the number of nodes.
+        let layout = Layout::new(partitions, tables.records_at, entries().map(|[length, _]| length));
+        let end = layout.end();
         opener.check_records(&tables, end - tables.records_at)?;
         // Memory is measured by it.
         if header.change_bytes > end {
@@ -137,9 +122,7 @@ impl MtFile {
             header,
             roots,
             root_bounds,
-            partitions,
-            partition_of,
-            offsets,
+            layout,
             log_numbers,
             base,
             below_base,
@@ -192,7 +175,7 @@ impl MtFile {
         let h = &self.header;
         let per = |a: u64, b: u64| a as f64 / b.max(1) as f64;
         let (bytes, triangles) = (self.source.len(), h.triangles);
-        let partitions = self.partitions.len() - 1;
+        let partitions = self.layout.partitions();
         let mut facts = vec![
             (
                 "format",
@@ -252,18 +235,18 @@ impl MtFile {
 
     /// Bytes of a node as stored.
     pub(crate) fn length(&self, node: u32) -> u64 {
-        self.offsets[node as usize + 1] - self.offsets[node as usize]
+        self.layout.length(node)
     }
 
     /// The partition that a node is in.
     #[inline]
     pub(crate) fn partition_of(&self, node: u32) -> u32 {
-        self.partition_of[node as usize]
+        self.layout.partition_of(node)
     }
 
     /// Bytes of nodes with consecutive numbers as stored.
     pub(crate) fn bytes(&self, nodes: std::ops::Range<u32>) -> u64 {
-        self.offsets[nodes.end as usize] - self.offsets[nodes.start as usize]
+        self.layout.bytes(nodes)
     }
 
     /// Reads the records of nodes with consecutive numbers, in one go. A record that is damaged is told apart from the
@@ -274,15 +257,15 @@ impl MtFile {
         bytes: &mut Vec<u8>,
     ) -> Result<Vec<Result<Record, MtError>>, MtError> {
         let opener = Opener { source: &*self.source };
-        let start = self.offsets[nodes.start as usize];
-        bytes.resize((self.offsets[nodes.end as usize] - start) as usize, 0);
+        let start = self.offset(nodes.start);
+        bytes.resize(self.bytes(nodes.clone()) as usize, 0);
         read_at(&*self.source, start, bytes)?;
         let limits = Limits { nodes: self.nodes(), vertices: self.header.vertices as u32 };
+        let mut from = 0;
         let record = |node: u32| {
-            let [from, to] = [node, node + 1].map(|n| (self.offsets[n as usize] - start) as usize);
-            let offset = start + from as u64;
-            let record =
-                Record::new(&bytes[from..to], limits).map_err(|wrong| opener.record(offset, wrong))?;
+            let (offset, to) = (start + from as u64, from + self.length(node) as usize);
+            let record = Record::new(&bytes[std::mem::replace(&mut from, to)..to], limits)
+                .map_err(|wrong| opener.record(offset, wrong))?;
             if record.number() == node {
                 Ok(record)
             } else {
@@ -330,6 +313,6 @@ impl MtFile {
     }
 
     pub(crate) fn offset(&self, node: u32) -> u64 {
-        self.offsets[node as usize]
+        self.layout.offset(node)
     }
 }

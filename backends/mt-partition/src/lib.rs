@@ -37,6 +37,7 @@ mod error;
 mod file;
 mod format;
 mod graph;
+mod layout;
 mod memory;
 mod opening;
 mod options;

@@ -2,7 +2,7 @@
 
 use std::collections::VecDeque;
 
-use vertex_tree::NONE;
+use vertex_tree::SparseTable;
 
 use crate::memory::Memory;
 use crate::record::Record;
@@ -22,14 +22,17 @@ struct Resident {
     agrees: [bool; 2],
 }
 
+/// Nodes of a piece of the tables of what is in memory or in the cut: a few partitions, which come together.
+pub(crate) const PIECE: usize = 64;
+
 /// What a node takes in memory beyond its record.
 pub(crate) const OVERHEAD: u64 = (size_of::<Resident>() + size_of::<(u32, u32)>()) as u64;
 
 /// The nodes in memory, by number and by when they were last used.
 #[derive(Debug)]
 pub(crate) struct Residents {
-    /// For each node, its place among `all`; [`NONE`] if it is not in memory.
-    slots: Vec<u32>,
+    /// For each node in memory, its place among `all` and one more.
+    places: SparseTable<u32, PIECE>,
     all: Vec<Resident>,
     /// Nodes with the stamps that they had then: as they were loaded or left the cut.
     queue: VecDeque<(u32, u32)>,
@@ -43,7 +46,7 @@ pub(crate) struct Residents {
 impl Residents {
     pub fn new(nodes: u32, memory: Memory) -> Self {
         Self {
-            slots: vec![NONE; nodes as usize],
+            places: SparseTable::new(nodes),
             all: Vec::new(),
             queue: VecDeque::new(),
             stamp: 0,
@@ -61,35 +64,42 @@ impl Residents {
         &self.memory
     }
 
+    /// The place of a node among `all`, or none that is there.
+    #[inline(always)]
+    fn place(&self, node: u32) -> usize {
+        self.places.get(node).wrapping_sub(1) as usize
+    }
+
     pub fn contains(&self, node: u32) -> bool {
-        self.slots[node as usize] != NONE
+        self.places.get(node) != 0
     }
 
     #[inline]
     pub fn get(&self, node: u32) -> Option<&Record> {
-        self.all.get(self.slots[node as usize] as usize).map(|r| &r.record)
+        self.all.get(self.place(node)).map(|r| &r.record)
     }
 
     /// Starts to read the place of a node into the cache.
     #[inline]
     pub fn prefetch_slot(&self, node: u32) {
-        vertex_tree::prefetch(&self.slots, node as usize);
+        self.places.prefetch(node);
     }
 
     /// Starts to read what leads to the record of a node, once its place is there.
     #[inline]
     pub fn prefetch(&self, node: u32) {
-        vertex_tree::prefetch(&self.all, self.slots[node as usize] as usize);
+        vertex_tree::prefetch(&self.all, self.place(node));
     }
 
     fn get_mut(&mut self, node: u32) -> Option<&mut Resident> {
-        self.all.get_mut(self.slots[node as usize] as usize)
+        let place = self.place(node);
+        self.all.get_mut(place)
     }
 
     /// Whether a node has been compared with those above it, or with those below.
     #[inline(always)]
     pub fn has_agreed(&self, node: u32, below: bool) -> bool {
-        self.all.get(self.slots[node as usize] as usize).is_some_and(|r| r.agrees[usize::from(below)])
+        self.all.get(self.place(node)).is_some_and(|r| r.agrees[usize::from(below)])
     }
 
     /// A node has been compared with those above it, or with those below.
@@ -101,9 +111,9 @@ impl Residents {
 
     /// Takes in a node of so many bytes, for which room has been reserved, and which is not in memory.
     pub fn insert(&mut self, node: u32, record: Record, bytes: u64) {
-        self.slots[node as usize] = self.all.len() as u32;
         self.stamp = self.stamp.wrapping_add(1);
         self.all.push(Resident { node, record, pins: 0, stays: 0, stamp: self.stamp, agrees: [false; 2] });
+        self.places.set(node, self.all.len() as u32);
         self.bytes += bytes;
         self.enqueue(node, self.stamp);
     }
@@ -122,8 +132,9 @@ impl Residents {
         self.queue.push_back((node, stamp));
         // Entries that are out of date are not worth more memory than the nodes are.
         if self.queue.len() > 4 * self.all.len() + 64 {
-            let Self { queue, slots, all, .. } = self;
-            queue.retain(|&(n, s)| all.get(slots[n as usize] as usize).is_some_and(|r| r.stamp == s));
+            let mut queue = std::mem::take(&mut self.queue);
+            queue.retain(|&(n, s)| self.all.get(self.place(n)).is_some_and(|r| r.stamp == s));
+            self.queue = queue;
         }
     }
 
@@ -144,18 +155,19 @@ impl Residents {
 
     /// Whether the node may go.
     pub fn is_free(&self, node: u32, frame: u64) -> bool {
-        self.all.get(self.slots[node as usize] as usize).is_some_and(|r| r.pins == 0 && r.stays < frame)
+        self.all.get(self.place(node)).is_some_and(|r| r.pins == 0 && r.stays < frame)
     }
 
     /// Lets go of a node that takes so many bytes.
     pub fn remove(&mut self, node: u32, bytes: u64) {
-        let slot = std::mem::replace(&mut self.slots[node as usize], NONE) as usize;
-        if slot >= self.all.len() {
+        let before = self.places.set(node, 0);
+        let place = before.wrapping_sub(1) as usize;
+        if place >= self.all.len() {
             return;
         }
-        self.all.swap_remove(slot);
-        if let Some(moved) = self.all.get(slot) {
-            self.slots[moved.node as usize] = slot as u32;
+        self.all.swap_remove(place);
+        if let Some(moved) = self.all.get(place) {
+            self.places.set(moved.node, before);
         }
         self.bytes -= bytes;
         self.memory.release(bytes);
@@ -166,8 +178,7 @@ impl Residents {
         let mut later = Vec::new();
         let mut found = None;
         while let Some(&(node, stamp)) = self.queue.front() {
-            let is_current =
-                self.all.get(self.slots[node as usize] as usize).is_some_and(|r| r.stamp == stamp);
+            let is_current = self.all.get(self.place(node)).is_some_and(|r| r.stamp == stamp);
             if is_current && !held_back(node) {
                 if self.is_free(node, frame) {
                     found = Some(node);

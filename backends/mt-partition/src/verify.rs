@@ -40,8 +40,8 @@ impl MtFile {
             |offset, what, value| MtError::Range { file: self.name().to_owned(), offset, what, value };
         let mut seen: Vec<Seen> = Vec::with_capacity(nodes as usize);
         let mut buffer = Vec::new();
-        for pair in self.partitions.windows(2) {
-            for (node, record) in (pair[0]..pair[1]).zip(self.read(pair[0]..pair[1], &mut buffer)?) {
+        for nodes in (0..self.layout.partitions()).map(|partition| self.layout.nodes_of(partition)) {
+            for (node, record) in nodes.clone().zip(self.read(nodes, &mut buffer)?) {
                 let record = record?;
                 let is_root = record.above().all(|(above, _)| above == NONE);
                 if is_root != self.root_bounds(vertex_tree::NodeId(node)).is_some()

@@ -20,6 +20,7 @@ mod hierarchy;
 mod paging;
 mod prefetch;
 mod sink;
+mod sparse_table;
 mod tree;
 
 pub use bounds::{Bounds, NormalCone};
@@ -29,6 +30,7 @@ pub use hierarchy::{Hierarchy, NodeId, Refine, Step};
 pub use paging::{PageStats, Prefetch};
 pub use prefetch::prefetch;
 pub use sink::{MeshSink, NONE, NullSink, TriangleId, VertexId};
+pub use sparse_table::SparseTable;
 pub use tree::VertexTree;
 
 #[cfg(doctest)]

@@ -42,7 +42,7 @@ impl Front {
                         self.pairs[pair as usize].0[1] =
                             Record { bounds, node: child, children: 0, status: 0 };
                         if let Some(slots) = &mut self.slots {
-                            slots.insert(child, Slot(2 * pair + 1));
+                            slots.set(child.0, Slot(2 * pair + 1));
                         }
                         pair
                     }

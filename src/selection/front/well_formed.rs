@@ -1,10 +1,9 @@
 //! Whether the front's records are what they should be.
 
-use vertex_tree::{Hierarchy, NONE, NodeId};
+use vertex_tree::{Hierarchy, NONE, NodeId, SparseTable};
 
 use super::{ACTIVE, COUNT, Front, MANY, Record, mix};
 use crate::in_play::Slot;
-use crate::slot_table::SlotTable;
 
 impl Front {
     /// Checks that every pair of records is linked once or free, that each node in play has the record that the backend's
@@ -59,7 +58,7 @@ impl Front {
         assert_eq!(many, self.many.len(), "lists of pairs in use");
         assert!(self.spare.iter().all(Vec::is_empty), "lists of pairs to use again");
         if !T::IS_TREE {
-            let slots = self.slots.as_ref().map(SlotTable::len);
+            let slots = self.slots.as_ref().map(SparseTable::used);
             assert_eq!(slots, Some(in_play), "nodes with a slot");
             let bits: u32 = self.active_bits.iter().map(|bits| bits.count_ones()).sum();
             assert_eq!(bits as usize, active, "nodes whose bit says that they are active");

@@ -250,7 +250,8 @@ fn divide(
     layers: &mut Array<u32>,
 ) -> io::Result<Spool<2>> {
     let (scratch, share) = (work.scratch, work.memory / 16);
-    let most = (work.memory as u64 / 4 / (NODE_BYTES + 4 * ARC_BYTES)).max(1 << 8);
+    // With pairs of partitions in a heap, a region takes about twice what its graph does.
+    let most = (work.memory as u64 / 8 / (NODE_BYTES + 4 * ARC_BYTES)).max(1 << 8);
     // Nodes along the curve, cut into regions.
     let mut along = Sorter::<2>::new(scratch, share);
     for rank in 0..tops.len() {

@@ -3,17 +3,17 @@
 use std::ops::Range;
 use std::sync::Arc;
 
-use vertex_tree::{NONE, NodeId, prefetch};
+use vertex_tree::{NONE, NodeId, SparseTable};
 
 use super::change::Change;
 use crate::cache::{CacheMode, PartitionState, Passed};
 use crate::file::MtFile;
 use crate::memory::Memory;
 use crate::record::Record;
-use crate::residents::{OVERHEAD, Residents};
+use crate::residents::{OVERHEAD, PIECE, Residents};
 
-/// What is known of a node, in memory or not: all that a change asks about its neighbours lies together.
-#[derive(Clone, Copy, Debug)]
+/// What is known of a node that is in the cut, active or on its way: all that a change asks about its neighbours lies together.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
 struct NodeState {
     partition: u32,
     /// Its arcs in the cut.
@@ -23,13 +23,20 @@ struct NodeState {
     is_reserved: bool,
 }
 
+impl NodeState {
+    /// Whether there is anything to know of it.
+    fn is_known(self) -> bool {
+        self.links > 0 || self.is_active || self.is_reserved
+    }
+}
+
 #[derive(Debug)]
 pub(crate) struct Nodes {
     pub file: Arc<MtFile>,
     mode: CacheMode,
     pub residents: Residents,
     partitions: Vec<PartitionState>,
-    states: Vec<NodeState>,
+    states: SparseTable<NodeState, PIECE>,
     /// Partitions in which something has changed since they were last looked through.
     dirty: Vec<u32>,
     /// Whether nodes go for want of room only, whatever the cache mode.
@@ -39,17 +46,11 @@ pub(crate) struct Nodes {
 impl Nodes {
     /// None in memory, and the roots in the cut.
     pub fn new(file: Arc<MtFile>, mode: CacheMode, memory: Memory) -> Self {
-        let state = |node| NodeState {
-            partition: file.partition_of(node),
-            links: 0,
-            is_active: false,
-            is_reserved: false,
-        };
         let mut nodes = Self {
             mode,
             residents: Residents::new(file.nodes(), memory),
-            partitions: vec![PartitionState::default(); file.partitions.len() - 1],
-            states: (0..file.nodes()).map(state).collect(),
+            partitions: vec![PartitionState::default(); file.layout.partitions() as usize],
+            states: SparseTable::new(file.nodes()),
             dirty: Vec::new(),
             keeps_all: false,
             file,
@@ -64,7 +65,7 @@ impl Nodes {
     #[inline]
     pub fn prefetch(&self, node: u32) {
         self.residents.prefetch_slot(node);
-        prefetch(&self.states, node as usize);
+        self.states.prefetch(node);
     }
 
     /// Bytes that a node takes in memory.
@@ -84,30 +85,48 @@ impl Nodes {
 
     /// The nodes that a read of one brings.
     pub fn nodes_of(&self, unit: u32) -> Range<u32> {
-        if self.mode.reads_partitions() {
-            self.file.partitions[unit as usize]..self.file.partitions[unit as usize + 1]
-        } else {
-            unit..unit + 1
-        }
+        if self.mode.reads_partitions() { self.file.layout.nodes_of(unit) } else { unit..unit + 1 }
     }
 
     pub fn is_active(&self, node: u32) -> bool {
-        self.states[node as usize].is_active
+        self.states.get(node).is_active
     }
 
     pub fn is_in_cut(&self, node: u32) -> bool {
-        self.states[node as usize].links > 0
+        self.states.get(node).links > 0
+    }
+
+    /// Changes what is known of a node.
+    #[inline(always)]
+    fn change<R>(&mut self, node: u32, change: impl FnOnce(&mut NodeState) -> R) -> R {
+        let mut state = self.states.get(node);
+        if state == NodeState::default() {
+            state.partition = self.file.partition_of(node);
+        }
+        let changed = change(&mut state);
+        if !state.is_known() {
+            state = NodeState::default();
+        }
+        self.states.set(node, state);
+        changed
+    }
+
+    /// The partition that a node is in, which is at hand for those that are known.
+    #[inline(always)]
+    fn partition_of(&self, node: u32) -> u32 {
+        let state = self.states.get(node);
+        if state.is_known() { state.partition } else { self.file.partition_of(node) }
     }
 
     // What is on its way.
 
     pub fn is_reserved(&self, node: u32) -> bool {
-        self.states[node as usize].is_reserved
+        self.states.get(node).is_reserved
     }
 
     /// There is room for a node from now on.
     pub fn reserve(&mut self, node: u32) {
-        self.states[node as usize].is_reserved = true;
+        self.change(node, |state| state.is_reserved = true);
     }
 
     /// Bytes of those of some nodes that there is no room for yet.
@@ -118,7 +137,8 @@ impl Nodes {
     /// What does not come needs no room.
     pub fn release(&mut self, nodes: Range<u32>) {
         for node in nodes {
-            if std::mem::take(&mut self.states[node as usize].is_reserved) {
+            if self.is_reserved(node) {
+                self.change(node, |state| state.is_reserved = false);
                 self.residents.memory().release(self.bytes_of(node));
             }
         }
@@ -127,12 +147,11 @@ impl Nodes {
     /// A node has come. Says whether there was room for it.
     pub fn take_in(&mut self, node: u32, record: Record) -> bool {
         let bytes = self.bytes_of(node);
-        let state = &mut self.states[node as usize];
-        let partition = state.partition;
-        let has_room = std::mem::take(&mut state.is_reserved)
+        let has_room = self.change(node, |state| std::mem::take(&mut state.is_reserved))
             || !self.residents.contains(node) && self.residents.memory().try_reserve(bytes);
         if has_room {
             self.residents.insert(node, record, bytes);
+            let partition = self.file.partition_of(node);
             self.partitions[partition as usize].resident += 1;
             self.mark(partition);
         }
@@ -142,7 +161,7 @@ impl Nodes {
     /// Lets go of a node in memory.
     pub fn let_go(&mut self, node: u32) {
         self.residents.remove(node, self.bytes_of(node));
-        let state = &mut self.partitions[self.states[node as usize].partition as usize];
+        let state = &mut self.partitions[self.file.partition_of(node) as usize];
         state.resident -= 1;
         if state.resident == 0 {
             state.forget();
@@ -152,7 +171,7 @@ impl Nodes {
     /// The least recently used of the nodes that may go, that no cut holds and that `is_foreseen` does not keep.
     pub fn oldest(&mut self, frame: u64, is_foreseen: impl Fn(u32) -> bool) -> Option<u32> {
         let Self { residents, states, .. } = self;
-        residents.oldest(frame, |n| states[n as usize].links > 0 || is_foreseen(n))
+        residents.oldest(frame, |n| states.get(n).links > 0 || is_foreseen(n))
     }
 
     // The cut.
@@ -160,8 +179,10 @@ impl Nodes {
     /// An arc of the node comes into the cut.
     #[inline]
     fn enter(&mut self, node: u32) {
-        let state = &mut self.states[node as usize];
-        state.links += 1;
+        let state = self.change(node, |state| {
+            state.links += 1;
+            *state
+        });
         if state.links == 1 {
             self.partitions[state.partition as usize].in_cut += 1;
         }
@@ -170,13 +191,12 @@ impl Nodes {
     /// An arc of the node leaves the cut.
     #[inline]
     fn leave(&mut self, node: u32) {
-        let state = &mut self.states[node as usize];
-        if state.links == 0 {
+        let NodeState { links, partition, .. } = self.states.get(node);
+        if links == 0 {
             return;
         }
-        state.links -= 1;
-        if state.links == 0 {
-            let partition = state.partition;
+        self.change(node, |state| state.links -= 1);
+        if links == 1 {
             self.partitions[partition as usize].in_cut -= 1;
             self.residents.touch(node);
             self.mark(partition);
@@ -185,7 +205,7 @@ impl Nodes {
 
     /// Something has changed in the partition of a node.
     pub fn mark_of(&mut self, node: u32) {
-        self.mark(self.states[node as usize].partition);
+        self.mark(self.file.partition_of(node));
     }
 
     fn mark(&mut self, partition: u32) {
@@ -200,7 +220,7 @@ impl Nodes {
     /// A change has brought an arc of the node into the cut.
     #[inline]
     fn note(&mut self, node: u32, change: Change) {
-        let partition = self.states[node as usize].partition;
+        let partition = self.partition_of(node);
         let state = &mut self.partitions[partition as usize];
         match change {
             Change::Unfold => state.came_down = true,
@@ -219,11 +239,13 @@ impl Nodes {
         for &n in loss {
             self.leave(n);
         }
-        let state = &mut self.states[node as usize];
-        state.is_active = change == Change::Unfold;
-        // A root without triangles is shown by nothing; it is in play all the same.
-        if std::mem::replace(&mut state.links, arcs.max(1)) == 0 {
-            self.partitions[state.partition as usize].in_cut += 1;
+        let (before, partition) = self.change(node, |state| {
+            state.is_active = change == Change::Unfold;
+            // A root without triangles is shown by nothing; it is in play all the same.
+            (std::mem::replace(&mut state.links, arcs.max(1)), state.partition)
+        });
+        if before == 0 {
+            self.partitions[partition as usize].in_cut += 1;
         }
         self.note(node, change);
     }
@@ -251,8 +273,7 @@ impl Nodes {
         let mut postponed = Vec::new();
         for partition in dirty.drain(..) {
             self.partitions[partition as usize].is_dirty = false;
-            let nodes =
-                self.file.partitions[partition as usize]..self.file.partitions[partition as usize + 1];
+            let nodes = self.file.layout.nodes_of(partition);
             let state = self.partitions[partition as usize];
             if self.mode == CacheMode::PCc && state.in_cut > 0 {
                 continue;
@@ -334,6 +355,7 @@ impl Nodes {
 
 impl Drop for Nodes {
     fn drop(&mut self) {
-        self.release(0..self.file.nodes());
+        let reserved = self.states.iter().filter(|(_, state)| state.is_reserved);
+        reserved.for_each(|(node, _)| self.residents.memory().release(self.bytes_of(node)));
     }
 }
