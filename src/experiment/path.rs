@@ -12,7 +12,7 @@ mod format;
 mod generate;
 pub mod import;
 mod summary;
-mod text;
+pub(super) mod text;
 mod walkthrough;
 
 #[cfg(feature = "cli")]

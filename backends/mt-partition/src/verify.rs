@@ -59,10 +59,13 @@ impl MtFile {
                 });
             }
         }
-        let mut totals = (0, 0);
+        let (mut totals, mut largest) = ((0, 0), (0, 0));
         self.verify_arcs(NONE, &self.base, &mut seen, &mut totals)?;
         for node in 0..nodes {
-            self.verify_arcs(node, &self.read_node(node)?, &mut seen, &mut totals)?;
+            let record = self.read_node(node)?;
+            self.verify_arcs(node, &record, &mut seen, &mut totals)?;
+            let (bytes, nodes) = self.change(node, &record);
+            largest = (largest.0.max(bytes), largest.1.max(nodes));
         }
         for (node, seen) in (0..).zip(&seen) {
             if seen.above != seen.below {
@@ -72,12 +75,28 @@ impl MtFile {
                 return Err(range(self.offset(node), "triangles above a node", seen.coarse.into()));
             }
         }
-        let counts =
-            [("arcs", self.header.arcs, totals.0), ("triangles on arcs", self.header.stored, totals.1)];
-        match counts.into_iter().find(|(_, stored, counted)| stored != counted) {
-            Some((what, stored, _)) => Err(range(0, what, stored)),
+        let header = &self.header;
+        let counts = [
+            (64, "triangles on arcs", header.stored, totals.1),
+            (72, "arcs", header.arcs, totals.0),
+            (104, "bytes of the largest change", header.change_bytes, largest.0),
+            (112, "nodes of the largest change", header.change_nodes, largest.1),
+        ];
+        match counts.into_iter().find(|(.., stored, counted)| stored != counted) {
+            Some((offset, what, stored, _)) => Err(range(offset, what, stored)),
             None => Ok(()),
         }
+    }
+
+    /// What a change of a node needs in memory: the node, and all below it or all above it.
+    fn change(&self, node: u32, record: &Record) -> (u64, u64) {
+        let sum = |others: &mut dyn Iterator<Item = u32>| {
+            let there = others.filter(|&other| other < self.nodes());
+            there.fold((0, 0), |(bytes, nodes), other| (bytes + self.length(other), nodes + 1))
+        };
+        let below = sum(&mut record.arcs().map(|arc| arc.below));
+        let above = sum(&mut record.above().map(|(above, _)| above));
+        (self.length(node) + below.0.max(above.0), 1 + below.1.max(above.1))
     }
 
     fn verify_arcs(

@@ -172,11 +172,11 @@ impl Line<'_> {
 
     fn header_out_of_range(self, key: &'static str, value: &str, range: &'static str) -> PathError {
         let (file, line) = (self.file.to_owned(), self.line);
-        PathError::Header { file, line, key, value: value.to_owned(), range }
+        PathError::Header { file, line, key, value: text::beginning(value), range }
     }
 
     fn not_a_number(self, value: &str) -> PathError {
-        PathError::Number { file: self.file.to_owned(), line: self.line, value: value.to_owned() }
+        PathError::Number { file: self.file.to_owned(), line: self.line, value: text::beginning(value) }
     }
 
     /// A finite number.
