@@ -5,7 +5,7 @@ use rand::{Rng, RngExt};
 use crate::values::{self, NUMBERS};
 
 /// No input becomes longer.
-pub const MOST_BYTES: usize = 1 << 16;
+pub const MOST_BYTES: usize = 1 << 15;
 
 /// Changes bytes, whatever they mean.
 pub fn bytes(input: &mut Vec<u8>, other: &[u8], random: &mut impl Rng) {

@@ -1,5 +1,6 @@
 //! `verify`: every record, every reference, and what the engine relies on.
 
+use rustc_hash::FxHashMap;
 use vertex_tree::NONE;
 
 use crate::bounds::holds;
@@ -27,9 +28,27 @@ fn mix(above: u32, position: u32) -> u64 {
     z ^ (z >> 31)
 }
 
+/// Where each vertex is, as the first record has it that has it.
+#[derive(Default)]
+struct Places(FxHashMap<u32, [u32; 3]>);
+
+impl Places {
+    /// Whether a record has its vertices where those before it have them; otherwise the first that it has elsewhere.
+    fn agree(&mut self, record: &Record) -> Result<(), u32> {
+        for (number, place) in (0..record.vertices()).map(|vertex| record.vertex(vertex)) {
+            let place = place.map(f32::to_bits);
+            if *self.0.entry(number).or_insert(place) != place {
+                return Err(number);
+            }
+        }
+        Ok(())
+    }
+}
+
 impl MtFile {
     /// Reads everything and checks that it fits together: every record is whole, both ends of an arc know of each other,
-    /// layers grow along arcs (so there is no cycle), bounds are nested along them, roots are roots, counts are right.
+    /// layers grow along arcs (so there is no cycle), bounds are nested along them, roots are roots, vertices have one place each, counts
+    /// are right. Takes some 30 bytes a vertex of memory, and 60 a node.
     ///
     /// # Errors
     /// The first thing that does not fit.
@@ -59,11 +78,16 @@ impl MtFile {
                 });
             }
         }
-        let (mut totals, mut largest) = ((0, 0), (0, 0));
+        let (mut totals, mut largest, mut places) = ((0, 0), (0, 0), Places::default());
         self.verify_arcs(NONE, &self.base, &mut seen, &mut totals)?;
+        // The first record: it contradicts none.
+        let _ = places.agree(&self.base);
         for node in 0..nodes {
             let record = self.read_node(node)?;
             self.verify_arcs(node, &record, &mut seen, &mut totals)?;
+            if let Err(vertex) = places.agree(&record) {
+                return Err(range(self.offset(node), "another place of vertex", vertex.into()));
+            }
             let (bytes, nodes) = self.change(node, &record);
             largest = (largest.0.max(bytes), largest.1.max(nodes));
         }

@@ -87,8 +87,8 @@ pub fn tile(bytes: &[u8], desk: &Desk) -> bool {
     let mut words = line.split(' ');
     let name = words.next().unwrap_or("");
     let length: u64 = words.next().and_then(|word| word.parse().ok()).unwrap_or(0);
-    // Names of files, and lengths that make no full disk.
-    if name.is_empty() || name.len() > 100 || name.contains(['/', '\0']) || length > 1 << 26 {
+    // Names that a file may have and an error may show, and lengths that make no full disk.
+    if name.is_empty() || name.len() > 100 || name.contains(|c: char| c == '/' || c.is_control()) || length > 1 << 26 {
         return false;
     }
     let path = desk.folder.join(format!("{name}.hgt"));

@@ -39,9 +39,9 @@ fn check(path: &Path) {
     assert!(again == Path { name, units, ..path.clone() }, "written and read again, a path is another");
 }
 
-/// Frames a second at which a trajectory is first read: then its length is known, and whether it can be read at others.
-const SLOW: f64 = 0.001;
-const MOST_FRAMES: usize = 20_000;
+/// Frames a second at which a trajectory is read, one after the other, as long as there are not too many.
+const RATES: [f64; 4] = [1e-9, 1e-4, 1.0, 60.0];
+const MOST_FRAMES: f64 = 2500.0;
 
 pub fn imported(bytes: &[u8], desk: &Desk) -> bool {
     let ground = desk.ground.get_or_init(ground);
@@ -49,33 +49,33 @@ pub fn imported(bytes: &[u8], desk: &Desk) -> bool {
     let choice = choice(bytes) >> 8;
     let mode = [Mode::Fly, Mode::Walk, Mode::Orbit][choice as usize % 3];
     let up = [None, Some(Up::Y), Some(Up::Z)][choice as usize / 3 % 3];
-    let mut options = Options { mode, rate: SLOW, up, fit: choice / 9 % 4 != 0 };
-    let mut taken = false;
-    for rate in [SLOW, 1.0, 60.0] {
+    let mut options = Options { mode, rate: 0.0, up, fit: choice / 9 % 4 != 0 };
+    let (mut taken, mut seconds) = (false, 0.0);
+    for rate in RATES {
+        if seconds * rate > MOST_FRAMES {
+            break;
+        }
         options.rate = rate;
         let mut warnings = Vec::new();
         let read = import::import_warning(&file, ground, &options, &mut |warning| warnings.push(warning));
         for warning in warnings {
             let text = warning.to_string();
-            assert!(!text.is_empty() && !text.chars().any(char::is_control), "a warning {text:?}");
+            assert!(!text.is_empty() && !text.contains(char::is_control), "a warning {text:?}");
             assert!(text.len() <= super::LONGEST, "a warning of {} bytes", text.len());
         }
-        let frames = match read {
+        match read {
             Err(error) => {
                 check_error(&error);
                 break;
             }
             Ok(path) => {
                 taken = true;
-                if path.frames.len() <= MOST_FRAMES {
+                seconds = path.frames.len() as f64 / rate;
+                // The first may have as many as there can be.
+                if path.frames.len() as f64 <= MOST_FRAMES {
                     check(&path);
                 }
-                path.frames.len()
             }
-        };
-        // At the next rate there are up to a thousand times as many.
-        if frames * 1000 > MOST_FRAMES {
-            break;
         }
     }
     taken
