@@ -146,7 +146,8 @@ fn desk() -> Result<(Desk, PathBuf), String> {
 
 /// Runs a target, or all. Whether nothing was found.
 pub fn run(name: &str, options: &Options) -> Result<bool, String> {
-    let chosen: Vec<&Target> = targets::ALL.iter().filter(|target| name == "all" || target.name == name).collect();
+    let chosen: Vec<&Target> =
+        targets::ALL.iter().filter(|target| name == "all" || target.name == name).collect();
     if chosen.is_empty() {
         return Err(format!("no target {name}"));
     }
@@ -164,7 +165,8 @@ pub fn run(name: &str, options: &Options) -> Result<bool, String> {
 }
 
 fn run_one(target: &Target, options: &Options, seconds: f64, desk: &Desk) -> Result<u64, String> {
-    let inputs = Inputs::new(target.name, options.seed).map_err(|error| format!("{}: {error}", target.name))?;
+    let inputs =
+        Inputs::new(target.name, options.seed).map_err(|error| format!("{}: {error}", target.name))?;
     let begin = Instant::now();
     let (mut taken, mut finds) = (0_u64, 0_u64);
     let mut places: BTreeMap<String, u64> = BTreeMap::new();

@@ -23,8 +23,9 @@ pub struct Inputs {
 impl Inputs {
     /// What is in the corpus, in the order of its names.
     pub fn new(name: &'static str, seed: u64) -> std::io::Result<Self> {
-        let mut files: Vec<PathBuf> =
-            fs::read_dir(corpora().join(name))?.map(|entry| Ok(entry?.path())).collect::<std::io::Result<_>>()?;
+        let mut files: Vec<PathBuf> = fs::read_dir(corpora().join(name))?
+            .map(|entry| Ok(entry?.path()))
+            .collect::<std::io::Result<_>>()?;
         files.sort();
         let corpus = files.iter().map(fs::read).collect::<std::io::Result<Vec<_>>>()?;
         assert!(!corpus.is_empty(), "{name}: nothing in the corpus");
@@ -65,7 +66,11 @@ impl Inputs {
                 "ply" | "stl" | "hgt" => random.random_ratio(1, 2),
                 _ => random.random_ratio(15, 16),
             };
-            if is_text { mutate::text(input, other, words, random) } else { mutate::bytes(input, other, random) }
+            if is_text {
+                mutate::text(input, other, words, random)
+            } else {
+                mutate::bytes(input, other, random)
+            }
         }
     }
 }
@@ -75,18 +80,93 @@ fn words(name: &str) -> &'static [&'static str] {
     match name {
         "obj" => &["v", "f", "vn", "vt", "l", "p", "o", "g", "#", "\\", "1/1/1", "2//1", "-1", "curv"],
         "ply" => &[
-            "ply", "format", "ascii", "binary_little_endian", "binary_big_endian", "1.0", "comment", "element", "vertex", "face",
-            "tristrips", "property", "list", "uchar", "char", "short", "ushort", "int", "uint", "float", "double", "int8", "float64", "x",
-            "y", "z", "vertex_index", "vertex_indices", "end_header",
+            "ply",
+            "format",
+            "ascii",
+            "binary_little_endian",
+            "binary_big_endian",
+            "1.0",
+            "comment",
+            "element",
+            "vertex",
+            "face",
+            "tristrips",
+            "property",
+            "list",
+            "uchar",
+            "char",
+            "short",
+            "ushort",
+            "int",
+            "uint",
+            "float",
+            "double",
+            "int8",
+            "float64",
+            "x",
+            "y",
+            "z",
+            "vertex_index",
+            "vertex_indices",
+            "end_header",
         ],
-        "stl" => &["solid", "facet", "normal", "outer", "loop", "vertex", "endloop", "endfacet", "endsolid", "#"],
+        "stl" => {
+            &["solid", "facet", "normal", "outer", "loop", "vertex", "endloop", "endfacet", "endsolid", "#"]
+        }
         "off" => &["OFF", "COFF", "NOFF", "CNOFF", "STOFF", "4OFF", "nOFF", "BINARY", "#"],
         "hgt" => &["N36W119", "S90W180", "N00E000", "s07e110.SRTMGL1", "2884802", "25934402", "2884803"],
-        "path" => &["#", "# name", "# units m", "# fov 60", "# fov 1 rad", "# aspect", "# aspect 2", "rad", "fov", "aspect"],
+        "path" => &[
+            "#",
+            "# name",
+            "# units m",
+            "# fov 60",
+            "# fov 1 rad",
+            "# aspect",
+            "# aspect 2",
+            "rad",
+            "fov",
+            "aspect",
+        ],
         "import" => &[
-            "#", "%", "//", "t", "time", "timestamp", "t[ns]", "time_ms", "x", "y", "z", "px", "tx", "east", "north", "up", "lat", "lon",
-            "alt", "alt (ft)", "height", "qx", "qy", "qz", "qw", "w", "F", "F 0", "# fov 60", "# aspect 1.5", ",", ";", ";;", "euroc",
-            "kitti", "optical", "y up", "2014-01-01T00:00:00Z", "1700000000123456789",
+            "#",
+            "%",
+            "//",
+            "t",
+            "time",
+            "timestamp",
+            "t[ns]",
+            "time_ms",
+            "x",
+            "y",
+            "z",
+            "px",
+            "tx",
+            "east",
+            "north",
+            "up",
+            "lat",
+            "lon",
+            "alt",
+            "alt (ft)",
+            "height",
+            "qx",
+            "qy",
+            "qz",
+            "qw",
+            "w",
+            "F",
+            "F 0",
+            "# fov 60",
+            "# aspect 1.5",
+            ",",
+            ";",
+            ";;",
+            "euroc",
+            "kitti",
+            "optical",
+            "y up",
+            "2014-01-01T00:00:00Z",
+            "1700000000123456789",
         ],
         "scene" => &["#", "bunny.ply", "a b.ply", "../x.meta", "/", "."],
         _ => &[],

@@ -32,7 +32,9 @@ fn main() -> ExitCode {
             targets::ALL.iter().for_each(|target| println!("{:8} {:?}", target.name, target.class));
             Ok(true)
         }
-        ["run", name, ref options @ ..] => driver::Options::parse(options).and_then(|options| driver::run(name, &options)),
+        ["run", name, ref options @ ..] => {
+            driver::Options::parse(options).and_then(|options| driver::run(name, &options))
+        }
         ["replay", ref files @ ..] => driver::replay(files.iter().map(Path::new)),
         ["seeds"] => seeds::write(),
         _ => {

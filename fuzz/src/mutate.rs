@@ -105,7 +105,9 @@ pub fn text(input: &mut Vec<u8>, other: &[u8], words: &[&str], random: &mut impl
 fn token(input: &mut Vec<u8>, words: &[&str], random: &mut impl Rng) {
     let start = random.random_range(0..=input.len());
     let is_space = |byte: &u8| byte.is_ascii_whitespace() || b",;/".contains(byte);
-    let Some(begin) = input[start..].iter().position(|byte| !is_space(byte)).map(|at| start + at) else { return };
+    let Some(begin) = input[start..].iter().position(|byte| !is_space(byte)).map(|at| start + at) else {
+        return;
+    };
     let begin = input[..begin].iter().rposition(is_space).map_or(0, |at| at + 1);
     let end = input[begin..].iter().position(is_space).map_or(input.len(), |at| begin + at);
     let old = String::from_utf8_lossy(&input[begin..end]).into_owned();
@@ -116,7 +118,9 @@ fn token(input: &mut Vec<u8>, words: &[&str], random: &mut impl Rng) {
         6 => format!("{old} {}", NUMBERS[random.random_range(0..NUMBERS.len())]),
         7 => format!("{old}{old}"),
         8 => format!("{}.{}", "7".repeat(random.random_range(1..300)), random.random_range(0..10)),
-        9 => old.parse::<i64>().map_or(old, |n| n.wrapping_add([1, -1][random.random_range(0..2)]).to_string()),
+        9 => {
+            old.parse::<i64>().map_or(old, |n| n.wrapping_add([1, -1][random.random_range(0..2)]).to_string())
+        }
         10 => old.to_uppercase(),
         _ => format!("{old}e{}", random.random_range(-400..400)),
     };
@@ -160,7 +164,10 @@ fn breaks(input: &mut Vec<u8>, random: &mut impl Rng) {
         }
         _ => {
             let at = random.random_range(0..=input.len());
-            input.splice(at..at, [b"\n\n\n".as_slice(), b" \\\n", b"\t", b"\x0b\x0c"][random.random_range(0..4)].to_vec());
+            input.splice(
+                at..at,
+                [b"\n\n\n".as_slice(), b" \\\n", b"\t", b"\x0b\x0c"][random.random_range(0..4)].to_vec(),
+            );
         }
     }
 }
@@ -168,7 +175,16 @@ fn breaks(input: &mut Vec<u8>, random: &mut impl Rng) {
 /// Bytes that say how others are to be read, or that are in no text.
 fn marks(input: &mut Vec<u8>, random: &mut impl Rng) {
     let marks = [
-        "\u{feff}".as_bytes(), b"\xff\xfe", b"\xfe\xff", b"\0", b"#", b"# ", b"\"", b"\x1b[2J", "\u{2028}".as_bytes(), b"\xe4",
+        "\u{feff}".as_bytes(),
+        b"\xff\xfe",
+        b"\xfe\xff",
+        b"\0",
+        b"#",
+        b"# ",
+        b"\"",
+        b"\x1b[2J",
+        "\u{2028}".as_bytes(),
+        b"\xe4",
         "\u{e9}".as_bytes(),
     ];
     let mark = marks[random.random_range(0..marks.len())];

@@ -79,8 +79,20 @@ fn header(input: &mut [u8], random: &mut impl Rng) {
 }
 
 const NAMES: [&str; 14] = [
-    "N36W119.hgt", "N36W118.hgt", "S90E180.hgt", "N90W180.hgt", "N00E000.HGT", "folder/N37W119.hgt", "../N38W119.hgt", "._N36W119.hgt",
-    "N91E000.hgt", "N1.hgt", "N36W119.hgt/", "N36\u{e9}119.hgt", "readme.txt", "",
+    "N36W119.hgt",
+    "N36W118.hgt",
+    "S90E180.hgt",
+    "N90W180.hgt",
+    "N00E000.HGT",
+    "folder/N37W119.hgt",
+    "../N38W119.hgt",
+    "._N36W119.hgt",
+    "N91E000.hgt",
+    "N1.hgt",
+    "N36W119.hgt/",
+    "N36\u{e9}119.hgt",
+    "readme.txt",
+    "",
 ];
 
 /// Damages an archive as it lies, or what is in it.
@@ -136,7 +148,8 @@ fn repack(input: &[u8], random: &mut impl Rng) -> Option<Vec<u8>> {
                 for _ in 0..random.random_range(1..100) {
                     if !bytes.is_empty() {
                         // Mostly in the first rows, which are read in any case.
-                        let most = if random.random_ratio(3, 4) { bytes.len().min(1 << 14) } else { bytes.len() };
+                        let most =
+                            if random.random_ratio(3, 4) { bytes.len().min(1 << 14) } else { bytes.len() };
                         let at = random.random_range(0..most);
                         bytes[at] = [0x80, 0, 0x7f, 0xff, 1][random.random_range(0..5)];
                     }
@@ -145,7 +158,9 @@ fn repack(input: &[u8], random: &mut impl Rng) -> Option<Vec<u8>> {
         }
     }
     let mut writer = ZipWriter::new(Cursor::new(Vec::new()));
-    let options = SimpleFileOptions::default().compression_method(CompressionMethod::Deflated).compression_level(Some(1));
+    let options = SimpleFileOptions::default()
+        .compression_method(CompressionMethod::Deflated)
+        .compression_level(Some(1));
     for (name, bytes) in entries {
         writer.start_file(name, options).ok()?;
         writer.write_all(&bytes).ok()?;

@@ -153,7 +153,8 @@ impl Format {
         }
         if consistent && self.pages == Pages::DetailBlock {
             put_long(&mut parts.header, 136, at as u64);
-            let pages_at = parts.sections.iter().position(|section| section.kind == *b"PAGE").map(|i| places[i]);
+            let pages_at =
+                parts.sections.iter().position(|section| section.kind == *b"PAGE").map(|i| places[i]);
             let index = parts.sections.iter_mut().find(|section| section.kind == *b"PAGT");
             if let (Some(mut at), Some(index)) = (pages_at, index) {
                 index.bytes.clear();
@@ -190,12 +191,14 @@ impl Format {
     fn count(&self, parts: &mut Parts) {
         let lengths: Vec<u32> = parts.pages.iter().map(|page| page.len() as u32).collect();
         let header = &mut parts.header;
-        let find = |sections: &mut Vec<Section>, kind: &[u8; 4]| sections.iter().position(|s| s.kind == *kind);
+        let find =
+            |sections: &mut Vec<Section>, kind: &[u8; 4]| sections.iter().position(|s| s.kind == *kind);
         match self.pages {
             Pages::None => {}
             Pages::MetaNode => {
                 if let Some(at) = find(&mut parts.sections, b"PAGT") {
-                    parts.sections[at].bytes = lengths.iter().flat_map(|length| (length / 4).to_le_bytes()).collect();
+                    parts.sections[at].bytes =
+                        lengths.iter().flat_map(|length| (length / 4).to_le_bytes()).collect();
                 }
                 put(header, 60, lengths.iter().max().map_or(0, |length| length / 4));
                 put_long(header, 64, lengths.iter().map(|&length| u64::from(length)).sum());
@@ -255,7 +258,9 @@ impl Format {
         let lengths: Vec<usize> = counts
             .iter()
             .zip(self.counts)
-            .map(|(&count, &(.., each))| usize::try_from(count).ok()?.checked_mul(each).filter(|&n| n <= bytes.len()))
+            .map(|(&count, &(.., each))| {
+                usize::try_from(count).ok()?.checked_mul(each).filter(|&n| n <= bytes.len())
+            })
             .collect::<Option<_>>()?;
         self.seal_header(bytes);
         match self.pages {
@@ -358,7 +363,8 @@ impl Format {
             10 | 11 if sections > 0 => self.resize_section(parts, random),
             12 if sections > 0 => self.change_table(parts, random),
             13 | 14 if parts.pages.len() > 1 => {
-                let (a, b) = (random.random_range(0..parts.pages.len()), random.random_range(0..parts.pages.len()));
+                let (a, b) =
+                    (random.random_range(0..parts.pages.len()), random.random_range(0..parts.pages.len()));
                 match random.random_range(0..4) {
                     0 => parts.pages.swap(a, b),
                     1 => drop(parts.pages.remove(a)),
@@ -392,7 +398,8 @@ impl Format {
     fn resize_section(&self, parts: &mut Parts, random: &mut impl Rng) {
         let section = random.random_range(0..parts.sections.len());
         let section = &mut parts.sections[section];
-        let each = self.counts.iter().find(|(_, _, kind, _)| **kind == section.kind).map_or(4, |&(.., each)| each);
+        let each =
+            self.counts.iter().find(|(_, _, kind, _)| **kind == section.kind).map_or(4, |&(.., each)| each);
         let records = section.bytes.len() / each;
         let at = each * random.random_range(0..=records);
         if random.random_ratio(1, 2) && at + each <= section.bytes.len() {
@@ -406,7 +413,8 @@ impl Format {
 
     /// Sections that are missing, there twice, unknown, out of order or flagged otherwise.
     fn change_table(&self, parts: &mut Parts, random: &mut impl Rng) {
-        let (a, b) = (random.random_range(0..parts.sections.len()), random.random_range(0..parts.sections.len()));
+        let (a, b) =
+            (random.random_range(0..parts.sections.len()), random.random_range(0..parts.sections.len()));
         match random.random_range(0..7) {
             0 => drop(parts.sections.remove(a)),
             1 => {
@@ -415,7 +423,10 @@ impl Format {
             }
             2 => parts.sections.swap(a, b),
             3 => parts.sections[a].flags ^= 1 << random.random_range(0..3),
-            4 => parts.sections[a].kind = [*b"ATTR", *b"INPV", *b"GEOR", *b"\0\n\xffX"][random.random_range(0..4)],
+            4 => {
+                parts.sections[a].kind =
+                    [*b"ATTR", *b"INPV", *b"GEOR", *b"\0\n\xffX"][random.random_range(0..4)]
+            }
             5 => {
                 let kind = [*b"GEOR", *b"ATTR"][random.random_range(0..2)];
                 let bytes = vec![0; random.random_range(0..120)];

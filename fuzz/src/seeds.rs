@@ -100,7 +100,8 @@ fn two() -> Mesh {
     let first = mesh.positions.len() as u32;
     let other = sheet(3);
     mesh.positions.extend(other.positions.iter().map(|p| [p[0] + 2.0, p[1] + 2.0, p[2] + 0.5]));
-    mesh.triangles.extend(other.triangles.iter().map(|t| t.map(|v| if v == 0 { first - 1 } else { v + first })));
+    mesh.triangles
+        .extend(other.triangles.iter().map(|t| t.map(|v| if v == 0 { first - 1 } else { v + first })));
     mesh.positions.push([0.0, 0.0, 1.0]);
     let tip = mesh.positions.len() as u32 - 1;
     mesh.triangles.push([5, 6, tip]);

@@ -128,7 +128,10 @@ fn the_largest_change_is_as_large_as_the_header_says() {
 /// `verify` passed it, and no engine took it.
 #[test]
 fn an_origin_is_where_a_camera_can_be() {
-    says("fold/origin-beyond-any-camera.fold", "z of the origin of the georeference is -8.98846567431158e307");
+    says(
+        "fold/origin-beyond-any-camera.fold",
+        "z of the origin of the georeference is -8.98846567431158e307",
+    );
 }
 
 #[test]
@@ -156,7 +159,10 @@ fn no_word_of_a_path_is_said_whole() {
 fn what_libraries_say_is_one_line() {
     says("ply/type-with-a-control-character.ply", "Unknown scalar type: fl\u{fffd}at");
     says("ply/type-of-a-thousand-characters.ply", "Unknown scalar type");
-    says("zip/name-with-zeros.zip", "name-with-zeros.zip/\u{fffd}\u{fffd}\u{fffd}W119.hgt: the name of a height tile");
+    says(
+        "zip/name-with-zeros.zip",
+        "name-with-zeros.zip/\u{fffd}\u{fffd}\u{fffd}W119.hgt: the name of a height tile",
+    );
 }
 
 /// Room was made for 128 MiB.
@@ -168,4 +174,9 @@ fn a_tag_is_no_longer_than_its_file() {
 #[test]
 fn a_map_lies_at_a_longitude() {
     says("tif/longitude-that-is-no-number.tif", "the middle of the map is at a longitude of NaN degrees");
+}
+
+#[test]
+fn corners_of_base_triangles_are_at_three_vertices() {
+    says("meta/base-triangle-with-a-doubled-corner.meta", "of which two are at one vertex");
 }

@@ -124,7 +124,13 @@ impl Sections {
         let [x, y, z, largest_move, median_edge, longitude, latitude, a, b] = numbers;
         let coordinate_system = match std::str::from_utf8(&bytes[FIXED..]) {
             Ok(name) => name.to_owned(),
-            Err(_) => return error(FIXED, "the name", bytes[FIXED..].escape_ascii().take(40).map(char::from).collect()),
+            Err(_) => {
+                return error(
+                    FIXED,
+                    "the name",
+                    bytes[FIXED..].escape_ascii().take(40).map(char::from).collect(),
+                );
+            }
         };
         Ok(Georeference {
             origin: [x, y, z],

@@ -179,7 +179,12 @@ impl XfmFile {
             edges.orbit(first, &mut fan);
             if fan.len() as u32 != count {
                 let offset = at + u64::from(first / 4) * RECORD_BYTES;
-                return Err(self.field(offset, "an initial vertex", vertex, "around which faces are several fans"));
+                return Err(self.field(
+                    offset,
+                    "an initial vertex",
+                    vertex,
+                    "around which faces are several fans",
+                ));
             }
         }
         Ok(())

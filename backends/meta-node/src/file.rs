@@ -108,7 +108,11 @@ impl MetaNodeFile {
             at += 4 * ROOT_WORDS as u64;
         }
         if root_pages != header.root_pages {
-            return error(48, "the number of root pages, unlike that in the list of roots,", header.root_pages.into());
+            return error(
+                48,
+                "the number of root pages, unlike that in the list of roots,",
+                header.root_pages.into(),
+            );
         }
         at = vertices_at;
         let mut least = 0;
@@ -123,6 +127,16 @@ impl MetaNodeFile {
         for corners in &self.base_triangles {
             if let Some(&leaf) = corners.iter().find(|&&leaf| leaf >= header.leaves) {
                 return error(at, "the leaf of a base triangle", leaf.into());
+            }
+            // A base vertex has the leaves from its own up to that of the next.
+            let [a, b, c] =
+                corners.map(|leaf| self.base_vertices.partition_point(|&(first, _)| first <= leaf));
+            if a == b || b == c || c == a {
+                return error(
+                    at,
+                    "the leaf of a base triangle, of which two are at one vertex,",
+                    corners[0].into(),
+                );
             }
             at += 4 * TRIANGLE_WORDS as u64;
         }
@@ -145,7 +159,8 @@ impl MetaNodeFile {
             return error(64, "the length of all pages", header.page_bytes);
         }
         // Which page has how many nodes is found with the pages; here, that there is room for all of them.
-        let least = u64::from(header.pages) * HEADER_WORDS as u64 + u64::from(header.collapses) * NODE_WORDS as u64;
+        let least =
+            u64::from(header.pages) * HEADER_WORDS as u64 + u64::from(header.collapses) * NODE_WORDS as u64;
         if least > total_words {
             return error(20, "the number of collapses", header.collapses.into());
         }

@@ -38,7 +38,11 @@ impl Receiver for Strict {
     fn triangle(&mut self, corners: [u32; 3]) -> io::Result<()> {
         let [a, b, c] = corners;
         assert!(a != b && b != c && c != a, "a triangle {corners:?}");
-        assert!(corners.iter().all(|&v| v < self.vertices), "a triangle {corners:?} of {} vertices", self.vertices);
+        assert!(
+            corners.iter().all(|&v| v < self.vertices),
+            "a triangle {corners:?} of {} vertices",
+            self.vertices
+        );
         self.count()
     }
 
@@ -88,7 +92,11 @@ pub fn tile(bytes: &[u8], desk: &Desk) -> bool {
     let name = words.next().unwrap_or("");
     let length: u64 = words.next().and_then(|word| word.parse().ok()).unwrap_or(0);
     // Names that a file may have and an error may show, and lengths that make no full disk.
-    if name.is_empty() || name.len() > 100 || name.contains(|c: char| c == '/' || c.is_control()) || length > 1 << 26 {
+    if name.is_empty()
+        || name.len() > 100
+        || name.contains(|c: char| c == '/' || c.is_control())
+        || length > 1 << 26
+    {
         return false;
     }
     let path = desk.folder.join(format!("{name}.hgt"));

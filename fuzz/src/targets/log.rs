@@ -48,14 +48,21 @@ pub fn run(bytes: &[u8], desk: &Desk) -> bool {
 const BUILD_EVERY: u64 = 64;
 const PAGING: [Backend; 3] = [Backend::MetaNode, Backend::DetailBlock, Backend::MtPartition];
 
-/// What is made of a log that has been read is a file that is verified, or an error.
+/// What is made of a log that has been read is a file that is verified, but for nesting, or an error.
 fn build(log: &CollapseLog, backend: Backend, desk: &Desk) {
     let built = desk.folder.join("built");
     match store::write(backend, &built, log, &BuildOptions::default()) {
         Err(error) => check_error(&error),
         Ok(()) => {
-            let verified = Store::open(&built).and_then(|store| store.verify());
-            assert!(verified.is_ok(), "a file that has just been built: {:?}", verified.err());
+            if let Err(error) = Store::open(&built).and_then(|store| store.verify()) {
+                check_error(&error);
+                // Whether spheres are nested is not looked at in a log.
+                let text = error.to_string();
+                assert!(
+                    text.contains("not nested") || text.contains("do not hold"),
+                    "a file that has just been built: {text}"
+                );
+            }
         }
     }
 }
@@ -64,7 +71,8 @@ fn walk(log: &CollapseLog, seed: u64) {
     match InMemoryHierarchy::new(log) {
         Err(error) => check_error(&error),
         Ok(hierarchy) => {
-            let outcome = walk::follow(InMemoryTree::new(Arc::new(hierarchy)), seed, log.mesh.triangles.len(), true);
+            let outcome =
+                walk::follow(InMemoryTree::new(Arc::new(hierarchy)), seed, log.mesh.triangles.len(), true);
             assert!(outcome.is_clean(), "a log that has been read: {outcome:?}");
         }
     }

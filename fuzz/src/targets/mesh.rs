@@ -1,8 +1,8 @@
 //! Mesh files: read whole and piece by piece, which must come to the same, and simplified now and then.
 
+use foldfront::Mesh;
 use foldfront::construction::mesh_io::{self, Collector, ReadOptions};
 use foldfront::construction::simplify;
-use foldfront::Mesh;
 
 use super::{Desk, check_error, choice};
 
@@ -14,8 +14,7 @@ pub fn run(bytes: &[u8], name: &str, desk: &Desk) -> bool {
     let file = desk.lay(name, bytes);
     let whole = mesh_io::read(&[&file], &mut |_, _| ());
     let mut collector = Collector::default();
-    let sent =
-        mesh_io::send(&[&file], &ReadOptions::default(), &desk.folder, &mut collector, &mut |_, _| ());
+    let sent = mesh_io::send(&[&file], &ReadOptions::default(), &desk.folder, &mut collector, &mut |_, _| ());
     let pieces = sent.map(|()| collector.into_mesh());
     let (mesh, pieces) = match (whole, pieces) {
         (Ok(mesh), Ok(pieces)) => (mesh, pieces),
@@ -27,7 +26,10 @@ pub fn run(bytes: &[u8], name: &str, desk: &Desk) -> bool {
         }
         (whole, pieces) => panic!("read whole: {:?}, piece by piece: {:?}", whole.err(), pieces.err()),
     };
-    assert!(bits(&mesh) == bits(&pieces) && mesh.georeference == pieces.georeference, "other pieces than the whole");
+    assert!(
+        bits(&mesh) == bits(&pieces) && mesh.georeference == pieces.georeference,
+        "other pieces than the whole"
+    );
     check(&mesh);
     if choice(bytes).is_multiple_of(SIMPLIFY_EVERY) && mesh.triangles.len() <= MOST_TRIANGLES {
         match simplify::build(mesh, &simplify::Options::default(), &mut |_, _| ()) {

@@ -90,7 +90,7 @@ fn check_error(error: &dyn std::error::Error) {
 /// A number of an input by which choices are made: the same for the same input.
 fn choice(bytes: &[u8]) -> u64 {
     // FNV-1a.
-    bytes.iter().fold(0xcbf2_9ce4_8422_2325, |hash, &byte| {
-        (hash ^ u64::from(byte)).wrapping_mul(0x0100_0000_01b3)
-    })
+    bytes
+        .iter()
+        .fold(0xcbf2_9ce4_8422_2325, |hash, &byte| (hash ^ u64::from(byte)).wrapping_mul(0x0100_0000_01b3))
 }

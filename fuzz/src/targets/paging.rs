@@ -44,7 +44,10 @@ fn memory(choice: u64, least: u64) -> u64 {
 /// What verify passes is without a fault. Where every cut can be reached, it is.
 fn check(verified: bool, reaches: bool, outcome: &Outcome, source: &Source) {
     assert!(!verified || outcome.is_clean(), "verify passes what a walk comes upon: {outcome:?}");
-    assert!(!verified || !reaches || outcome.at_rest, "a file that is verified, and a cut that is not reached");
+    assert!(
+        !verified || !reaches || outcome.at_rest,
+        "a file that is verified, and a cut that is not reached"
+    );
     let (reads, _) = source.totals();
     assert!(reads <= MOST_READS, "{reads} reads");
 }

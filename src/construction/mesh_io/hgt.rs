@@ -150,7 +150,11 @@ fn open_archive(path: &Path) -> Result<ZipArchive<BufReader<File>>, MeshIoError>
 }
 
 fn archive_error(path: &Path, error: ZipError) -> MeshIoError {
-    MeshIoError::Decode { file: path.to_owned(), place: Place::Byte(0), source: input::readable(error.into()) }
+    MeshIoError::Decode {
+        file: path.to_owned(),
+        place: Place::Byte(0),
+        source: input::readable(error.into()),
+    }
 }
 
 fn read_samples(reader: &mut dyn Read, tile: &Found) -> Result<Vec<i16>, MeshIoError> {
