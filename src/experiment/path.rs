@@ -11,8 +11,9 @@ mod error;
 mod format;
 mod generate;
 pub mod import;
+pub(super) mod shown;
 mod summary;
-pub(super) mod text;
+mod text;
 mod walkthrough;
 
 #[cfg(feature = "cli")]

@@ -4,9 +4,10 @@ use std::fs;
 use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::path::{Path, PathBuf};
 
+use foldfront::collapse_log;
 use foldfront::construction::mesh_io;
 use foldfront::experiment::path::{self, import};
-use foldfront::experiment::store::Store;
+use foldfront::experiment::store::{self, Backend, BuildOptions, Store};
 use foldfront::experiment::stored_scene::read_scene;
 
 #[path = "../../fuzz/src/targets/mod.rs"]
@@ -179,4 +180,15 @@ fn a_map_lies_at_a_longitude() {
 #[test]
 fn corners_of_base_triangles_are_at_three_vertices() {
     says("meta/base-triangle-with-a-doubled-corner.meta", "of which two are at one vertex");
+}
+
+/// The file of partitions that was made of it could not be opened.
+#[test]
+fn spheres_without_one_around_them_are_refused() {
+    let log = collapse_log::read_log(&corpora().join("fold/spheres-too-far-apart-for-one.fold")).unwrap();
+    let folder = tempfile::tempdir().unwrap();
+    let built = folder.path().join("built.mt");
+    let error = store::write(Backend::MtPartition, &built, &log, &BuildOptions::default()).unwrap_err();
+    assert!(error.to_string().contains("radius: inf"), "{error}");
+    assert!(!built.exists());
 }

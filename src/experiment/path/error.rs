@@ -5,7 +5,7 @@ use std::path::PathBuf;
 
 use thiserror::Error;
 
-use super::text::few;
+use super::shown::few;
 use selection::view::ViewError;
 
 /// Why a path could not be read or written. Lines count from 1.

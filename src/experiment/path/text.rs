@@ -19,17 +19,6 @@ pub(super) fn read(file: &FilePath) -> Result<String, PathError> {
         .map_or_else(|_| bytes.iter().map(|&byte| char::from(byte)).collect(), str::to_owned))
 }
 
-/// What an error shows of a text: a word or a line of a damaged file can be the whole file.
-pub(in crate::experiment) fn beginning(text: &str) -> String {
-    text.chars().take(40).collect()
-}
-
-/// A number in few digits: the largest have 300 before the point, and the smallest as many behind it.
-pub(in crate::experiment) fn few(number: f64) -> String {
-    let text = number.to_string();
-    if text.len() > 24 { format!("{number:e}") } else { text }
-}
-
 /// The lines of a text, ended by a line feed, a carriage return or both, without white space around them. Some editors
 /// begin text with a byte order mark, which is no part of it.
 pub(super) fn lines(text: &str) -> impl Iterator<Item = &str> {

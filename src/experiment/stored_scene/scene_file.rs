@@ -13,7 +13,7 @@
 use std::io;
 use std::path::{Path, PathBuf};
 
-use crate::experiment::path::text;
+use crate::experiment::path::shown::beginning;
 use selection::objects::{Placement, PlacementError};
 
 /// A scene file can not be read.
@@ -98,7 +98,7 @@ pub(super) fn read_lines(path: &Path) -> Result<Vec<(usize, PathBuf, Placement)>
             *number = word.parse().map_err(|_| SceneFileError::Number {
                 file: file(),
                 line,
-                word: text::beginning(word),
+                word: beginning(word),
             })?;
             name = rest;
         }

@@ -5,7 +5,7 @@ use std::path::Path as FilePath;
 use super::error::{ImportError, Warning};
 use crate::experiment::path::PathError;
 use crate::experiment::path::format::Line;
-use crate::experiment::path::text::{beginning, few};
+use crate::experiment::path::shown::{beginning, few};
 
 /// A reading of a clock. Nanoseconds since 1970 have more digits than an f64.
 #[derive(Clone, Copy, Debug, PartialEq)]

@@ -7,7 +7,7 @@ use thiserror::Error;
 
 use super::options::MAX_RATE;
 use crate::experiment::path::error::PathError;
-use crate::experiment::path::text::few;
+use crate::experiment::path::shown::few;
 use selection::view::ViewError;
 
 /// Why a trajectory could not be imported. Lines count from 1.
