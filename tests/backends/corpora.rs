@@ -192,3 +192,16 @@ fn spheres_without_one_around_them_are_refused() {
     assert!(error.to_string().contains("radius: inf"), "{error}");
     assert!(!built.exists());
 }
+
+#[test]
+fn a_warning_says_places_in_few_digits() {
+    let file = corpora().join("import/height-of-300-digits.csv");
+    let mut ground = crate::common::bumpy_grid(5, &mut crate::common::seeded(1));
+    ground.georeference.degrees = Some(Default::default());
+    let options = import::Options { rate: 1.0, fit: false, ..import::Options::default() };
+    let mut warnings = Vec::new();
+    import::import_warning(&file, &ground, &options, &mut |warning| warnings.push(warning.to_string()))
+        .unwrap();
+    assert!(warnings.iter().any(|warning| warning.contains("no camera is near the mesh")), "{warnings:?}");
+    assert!(warnings.iter().all(|warning| warning.len() < 400), "{warnings:?}");
+}

@@ -200,7 +200,7 @@ pub enum Warning {
     /// A path that was not fitted is nowhere near the mesh.
     #[error(
         "{}: no camera is near the mesh: the path is in {} to {}, the mesh in {} to {}",
-        file.display(), path[0], path[1], mesh[0], mesh[1]
+        file.display(), corner(path[0]), corner(path[1]), corner(mesh[0]), corner(mesh[1])
     )]
     Elsewhere {
         /// The trajectory.
@@ -210,4 +210,9 @@ pub enum Warning {
         /// Corners of the box of the mesh, in world coordinates.
         mesh: [DVec3; 2],
     },
+}
+
+fn corner(place: DVec3) -> String {
+    let [x, y, z] = place.to_array().map(few);
+    format!("[{x}, {y}, {z}]")
 }
