@@ -11,6 +11,7 @@ mod error;
 mod format;
 mod generate;
 pub mod import;
+pub(super) mod shown;
 mod summary;
 mod text;
 mod walkthrough;

@@ -19,6 +19,7 @@ mod walks;
 
 mod conformance;
 mod conforming;
+mod corpora;
 mod detail_block;
 mod faults;
 mod meta_node;

@@ -50,9 +50,12 @@ fn numbers(georeference: &Georeference) -> [f64; 9] {
     [x, y, z, largest_move, median_edge, longitude, latitude, a, b]
 }
 
-/// The first number that is none, by its place in [`FIELDS`]. Lengths are not negative.
+/// The first number that is none, by its place in [`FIELDS`]. Lengths are not negative, and an origin is where a camera can be.
 fn wrong(numbers: &[f64; 9]) -> Option<usize> {
-    (0..9).find(|&i| !numbers[i].is_finite() || (3..5).contains(&i) && numbers[i] < 0.0)
+    (0..9).find(|&i| {
+        let is_far = i < 3 && numbers[i].abs() > Georeference::FARTHEST;
+        !numbers[i].is_finite() || is_far || (3..5).contains(&i) && numbers[i] < 0.0
+    })
 }
 
 /// Where a number stands.
@@ -68,7 +71,7 @@ pub(crate) fn to_section(georeference: &Georeference) -> io::Result<Option<Extra
     let (numbers, name) = (numbers(georeference), georeference.coordinate_system.as_bytes());
     let refuse = |why: String| Err(io::Error::new(io::ErrorKind::InvalidInput, why));
     if let Some(field) = wrong(&numbers) {
-        return refuse(format!("{} of the georeference is {}", FIELDS[field], numbers[field]));
+        return refuse(format!("{} of the georeference is {:?}", FIELDS[field], numbers[field]));
     }
     if name.len() > MOST_NAME {
         return refuse(format!(
@@ -116,12 +119,18 @@ impl Sections {
         let has_degrees = flags & FLAG_DEGREES != 0;
         let stray = (5..9).find(|&field| !has_degrees && numbers[field].to_bits() != 0);
         if let Some(field) = wrong(&numbers).or(stray) {
-            return error(place(field), FIELDS[field], numbers[field].to_string());
+            return error(place(field), FIELDS[field], format!("{:?}", numbers[field]));
         }
         let [x, y, z, largest_move, median_edge, longitude, latitude, a, b] = numbers;
         let coordinate_system = match std::str::from_utf8(&bytes[FIXED..]) {
             Ok(name) => name.to_owned(),
-            Err(_) => return error(FIXED, "the name", bytes[FIXED..].escape_ascii().to_string()),
+            Err(_) => {
+                return error(
+                    FIXED,
+                    "the name",
+                    bytes[FIXED..].escape_ascii().take(40).map(char::from).collect(),
+                );
+            }
         };
         Ok(Georeference {
             origin: [x, y, z],

@@ -138,6 +138,12 @@ impl XfmFile {
             }
             self.initial_faces.triangles.push(Triangle { start, rev });
         }
+        self.check_reverses(at)?;
+        self.check_fans(at)
+    }
+
+    /// Whether reverses are those of each other.
+    fn check_reverses(&self, at: u64) -> Result<(), XfmError> {
         let edges = &self.initial_faces;
         for t in 0..edges.triangles.len() as u32 {
             for h in [4 * t, 4 * t + 1, 4 * t + 2] {
@@ -150,6 +156,35 @@ impl XfmFile {
                     let offset = at + u64::from(t) * RECORD_BYTES + 12;
                     return Err(self.field(offset, "a reverse", back.into(), "which runs elsewhere"));
                 }
+            }
+        }
+        Ok(())
+    }
+
+    /// Whether the faces around each vertex are one fan, as those of a manifold are; reverses have been checked.
+    fn check_fans(&self, at: u64) -> Result<(), XfmError> {
+        let edges = &self.initial_faces;
+        let mut corners = vec![(0_u32, BOUNDARY); self.initial_vertices.len()];
+        for t in 0..edges.triangles.len() as u32 {
+            for h in [4 * t, 4 * t + 1, 4 * t + 2] {
+                let (count, first) = &mut corners[edges.start(h) as usize];
+                (*count, *first) = (*count + 1, h);
+            }
+        }
+        let mut fan = Vec::new();
+        for (vertex, (count, first)) in (0_u64..).zip(corners) {
+            if first == BOUNDARY {
+                return Err(self.field(24, "an initial vertex", vertex, "which no face has"));
+            }
+            edges.orbit(first, &mut fan);
+            if fan.len() as u32 != count {
+                let offset = at + u64::from(first / 4) * RECORD_BYTES;
+                return Err(self.field(
+                    offset,
+                    "an initial vertex",
+                    vertex,
+                    "around which faces are several fans",
+                ));
             }
         }
         Ok(())

@@ -42,6 +42,9 @@ pub(crate) fn read_header(source: &dyn PageSource) -> Result<Header, XfmError> {
     let Some(levels) = Levels::new(word(16)) else {
         return field(16, "levels a block", word(16).into(), "expected 1 to 5");
     };
+    if word(132) != 0 {
+        return field(132, "a word without use", word(132).into(), "expected 0");
+    }
     let flags = word(20);
     if flags & !(FLAG_QUANTISED | FLAG_NESTED) != 0 {
         return field(20, "flags", flags.into(), "with some that are not known");

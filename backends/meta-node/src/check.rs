@@ -51,13 +51,24 @@ fn check_around(page: Page, number: u32, limits: &Limits) -> Result<(), &'static
             return Err("a block does not hang below the page above");
         }
     }
+    if children > page.links() {
+        return Err("nothing leads to a page below");
+    }
+    let mut is_led_to = vec![false; children as usize];
     for link in 0..page.links() {
         let Link { node, log_number, bounds } = page.link(link);
         let below = (node.0 >> limits.slot_bits).checked_sub(first_child);
-        if below.is_none_or(|below| below >= children) || log_number >= limits.collapses || !bounds.is_sane()
-        {
+        let Some(is_led_to) = below.and_then(|below| is_led_to.get_mut(below as usize)) else {
             return Err("a link leads elsewhere than to a page below");
+        };
+        *is_led_to = true;
+        if log_number >= limits.collapses || !bounds.is_sane() {
+            return Err("a link leads to a node that can not be");
         }
+    }
+    // Pages below are asked for with this one, and all of them have to be its own.
+    if is_led_to.contains(&false) {
+        return Err("nothing leads to a page below");
     }
     Ok(())
 }

@@ -9,7 +9,7 @@ use vertex_tree::{Bounds, NodeId};
 use crate::check::check;
 use crate::error::MetaNodeError;
 use crate::format::{Header, ROOT_WORDS, Root, TRIANGLE_WORDS, VERTEX_WORDS};
-use crate::page::Layout;
+use crate::page::{HEADER_WORDS, Layout, NODE_WORDS};
 use crate::tables::Tables;
 
 /// An open file: header, base mesh and the index of the pages are in memory, the pages are not. Shared, unchanging:
@@ -94,7 +94,7 @@ impl MetaNodeFile {
             Err(MetaNodeError::Value { file: self.name().to_owned(), offset, what, value })
         };
         let [mut at, vertices_at, triangles_at, lengths_at] = tables_at;
-        let mut before = None;
+        let (mut before, mut root_pages) = (None, 0);
         for root in &self.roots {
             let (page, number) = (root.node.0 >> header.slot_bits, root.node.0);
             if page >= header.root_pages || before.is_some_and(|before| before >= number) {
@@ -103,8 +103,16 @@ impl MetaNodeFile {
             if root.log_number >= header.collapses || !root.bounds.is_sane() {
                 return error(at + 4, "the number in the log of a root", root.log_number.into());
             }
+            root_pages += u32::from(before.is_none_or(|before| before >> header.slot_bits < page));
             before = Some(number);
             at += 4 * ROOT_WORDS as u64;
+        }
+        if root_pages != header.root_pages {
+            return error(
+                48,
+                "the number of root pages, unlike that in the list of roots,",
+                header.root_pages.into(),
+            );
         }
         at = vertices_at;
         let mut least = 0;
@@ -119,6 +127,16 @@ impl MetaNodeFile {
         for corners in &self.base_triangles {
             if let Some(&leaf) = corners.iter().find(|&&leaf| leaf >= header.leaves) {
                 return error(at, "the leaf of a base triangle", leaf.into());
+            }
+            // A base vertex has the leaves from its own up to that of the next.
+            let [a, b, c] =
+                corners.map(|leaf| self.base_vertices.partition_point(|&(first, _)| first <= leaf));
+            if a == b || b == c || c == a {
+                return error(
+                    at,
+                    "the leaf of a base triangle, of which two are at one vertex,",
+                    corners[0].into(),
+                );
             }
             at += 4 * TRIANGLE_WORDS as u64;
         }
@@ -139,6 +157,12 @@ impl MetaNodeFile {
         }
         if total_words.checked_mul(4) != Some(header.page_bytes) {
             return error(64, "the length of all pages", header.page_bytes);
+        }
+        // Which page has how many nodes is found with the pages; here, that there is room for all of them.
+        let least =
+            u64::from(header.pages) * HEADER_WORDS as u64 + u64::from(header.collapses) * NODE_WORDS as u64;
+        if least > total_words {
+            return error(20, "the number of collapses", header.collapses.into());
         }
         Ok(())
     }

@@ -47,7 +47,7 @@ use vertex_tree::{Bounds, NodeId, prefetch};
 
 /// Words before the nodes.
 pub(crate) const HEADER_WORDS: usize = 9;
-const NODE_WORDS: usize = 14;
+pub(crate) const NODE_WORDS: usize = 14;
 const BLOCK_WORDS: usize = 2;
 const LINK_WORDS: usize = 7;
 pub(crate) const TRIANGLE_WORDS: usize = 3;

@@ -104,8 +104,12 @@ impl MtFile {
         let end = layout.end();
         opener.check_records(&tables, end - tables.records_at)?;
         // Memory is measured by it.
-        if header.change_bytes > end {
+        let largest = offsets.windows(2).map(|pair| pair[1] - pair[0]).max().unwrap_or(0);
+        if !(largest..=end - tables.records_at).contains(&header.change_bytes) {
             return Err(opener.range(104, "bytes of the largest change", header.change_bytes));
+        }
+        if header.nodes > 0 && header.change_nodes == 0 {
+            return Err(opener.range(112, "nodes of the largest change", header.change_nodes));
         }
         let (at, bytes) = &tables.base;
         let limits = Limits { nodes: header.nodes as u32, vertices: header.vertices as u32 };

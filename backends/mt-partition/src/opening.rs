@@ -71,6 +71,7 @@ impl Opener<'_> {
             (48, "partitions", header.partitions, header.nodes),
             (56, "roots", header.roots, header.nodes),
             (112, "nodes of the largest change", header.change_nodes, header.nodes),
+            (148, "order of the queue", header.decreasing.into(), 1),
         ];
         for (offset, what, value, limit) in limits {
             if value > limit {

@@ -48,6 +48,9 @@ pub struct DegreeMap {
 }
 
 impl Georeference {
+    /// No coordinate of an origin, or of a camera, is larger: the squares of their sums are finite.
+    pub const FARTHEST: f64 = 1e150;
+
     /// The world coordinates of a position.
     #[must_use]
     pub fn world(&self, position: [f32; 3]) -> [f64; 3] {

@@ -73,6 +73,9 @@ pub(super) fn locate(tags: &GeoTags, size: [u32; 2]) -> Result<Location, String>
     if latitude.abs() >= 90.0 || latitude.is_nan() {
         return Err(format!("the middle of the map is at a latitude of {latitude} degrees"));
     }
+    if let Some([longitude, _]) = middle.filter(|[longitude, _]| !longitude.is_finite()) {
+        return Err(format!("the middle of the map is at a longitude of {longitude} degrees"));
+    }
     for step in steps {
         *step = [step[0] * unit * METRES_PER_DEGREE * narrowing, step[1] * unit * METRES_PER_DEGREE];
     }

@@ -136,7 +136,7 @@ fn find_in_archive(path: &Path, found: &mut Vec<Found>) -> Result<(), MeshIoErro
         let name = name.rsplit('/').next().unwrap_or("");
         // Archives made on a Mac have a hidden companion `._NAME` for each file.
         if extension(Path::new(name)) == "hgt" && !name.starts_with('.') {
-            let mut tile = Found::new(path.join(name), entry.size())?;
+            let mut tile = Found::new(path.join(input::shown(name)), entry.size())?;
             tile.archived = Some((path.to_owned(), number));
             found.push(tile);
         }
@@ -150,7 +150,11 @@ fn open_archive(path: &Path) -> Result<ZipArchive<BufReader<File>>, MeshIoError>
 }
 
 fn archive_error(path: &Path, error: ZipError) -> MeshIoError {
-    MeshIoError::Decode { file: path.to_owned(), place: Place::Byte(0), source: error.into() }
+    MeshIoError::Decode {
+        file: path.to_owned(),
+        place: Place::Byte(0),
+        source: input::readable(error.into()),
+    }
 }
 
 fn read_samples(reader: &mut dyn Read, tile: &Found) -> Result<Vec<i16>, MeshIoError> {

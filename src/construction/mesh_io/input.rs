@@ -41,7 +41,7 @@ impl<'a> Input<'a> {
     /// The error for a decoding library's failure; libraries do not say where, so the place is how far they read.
     pub fn decode(&self, source: impl Into<Box<dyn Error + Send + Sync>>) -> MeshIoError {
         let place = Place::Byte(self.position);
-        MeshIoError::Decode { file: self.path.to_owned(), place, source: source.into() }
+        MeshIoError::Decode { file: self.path.to_owned(), place, source: readable(source.into()) }
     }
 
     pub fn unsupported(&self, feature: impl Into<String>) -> MeshIoError {
@@ -86,13 +86,27 @@ pub(super) fn open_error(path: &Path, source: io::Error) -> MeshIoError {
     }
 }
 
+/// An error of a decoding library, in one line: what libraries say may quote the file, which can hold anything.
+pub(super) fn readable(error: Box<dyn Error + Send + Sync>) -> Box<dyn Error + Send + Sync> {
+    let text = error.to_string();
+    if text.len() <= LONGEST && !text.contains(char::is_control) { error } else { shown(&text).into() }
+}
+
+/// The longest text of a library that is passed on whole.
+const LONGEST: usize = 200;
+
+/// The beginning of a text from a file, with marks in the place of what can not be shown.
+pub(super) fn shown(text: &str) -> String {
+    text.chars().take(80).map(|c| if c.is_control() { char::REPLACEMENT_CHARACTER } else { c }).collect()
+}
+
 /// The error for an I/O failure while reading the thing at `place`.
 pub(super) fn read_error(path: &Path, place: Place, source: io::Error) -> MeshIoError {
     let file = path.to_owned();
     match source.kind() {
         io::ErrorKind::UnexpectedEof => MeshIoError::Truncated { file, place },
         // Decoders that work as a reader say so in this way.
-        io::ErrorKind::InvalidData => MeshIoError::Decode { file, place, source: source.into() },
+        io::ErrorKind::InvalidData => MeshIoError::Decode { file, place, source: readable(source.into()) },
         _ => MeshIoError::Io { file, source },
     }
 }

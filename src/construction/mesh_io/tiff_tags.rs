@@ -14,6 +14,16 @@ const TRANSPARENCY_MASK: u64 = 4;
 /// No file has as many directories; a chain of them may be a ring.
 const MOST_DIRECTORIES: usize = 1000;
 
+/// Bytes of a value.
+fn size(kind: u64) -> u64 {
+    match kind {
+        3 | 8 => 2,
+        4 | 9 | 11 | 13 => 4,
+        5 | 10 | 12 | 16..=18 => 8,
+        _ => 1,
+    }
+}
+
 /// A TIFF in which zero is black.
 pub(super) struct Blackened<R> {
     reader: R,
@@ -42,6 +52,7 @@ impl<R: Read + Seek> Blackened<R> {
             b"MM\0*" | b"MM\0+" => true,
             _ => return Ok(()),
         };
+        let length = self.seek(SeekFrom::End(0))?;
         self.seek(SeekFrom::Start(2))?;
         let big_file = self.number::<2>(big_endian)? == 43;
         if big_file {
@@ -60,7 +71,14 @@ impl<R: Read + Seek> Blackened<R> {
             for _ in 0..entries.min(u64::from(u16::MAX)) {
                 let tag = self.number::<2>(big_endian)? as u16;
                 let kind = self.number::<2>(big_endian)?;
-                offset(self)?;
+                let values = offset(self)?;
+                // The library makes room for all of them before it looks whether they are there.
+                if values.saturating_mul(size(kind)) > length {
+                    return Err(io::Error::new(
+                        io::ErrorKind::InvalidData,
+                        format!("tag {tag} has {values} values, more than the file"),
+                    ));
+                }
                 let at = self.position;
                 // Shorts are in the first bytes of the field.
                 let value =

@@ -5,6 +5,7 @@ use std::path::PathBuf;
 
 use thiserror::Error;
 
+use super::shown::few;
 use selection::view::ViewError;
 
 /// Why a path could not be read or written. Lines count from 1.
@@ -48,7 +49,7 @@ pub enum PathError {
         value: String,
     },
     /// A frame is not later than the one before.
-    #[error("{}:{line}: the time {time} is not after {previous}", file.display())]
+    #[error("{}:{line}: the time {} is not after {}", file.display(), few(*time), few(*previous))]
     Time {
         /// The file.
         file: PathBuf,

@@ -6,6 +6,7 @@ use std::path::Path as FilePath;
 use glam::{DQuat, DVec3};
 
 use super::error::PathError;
+use super::shown::beginning;
 use super::text;
 use super::walkthrough::{Path, Pose};
 use selection::view::{ViewError, check_aspect, check_eye, check_fov, check_orientation};
@@ -172,11 +173,11 @@ impl Line<'_> {
 
     fn header_out_of_range(self, key: &'static str, value: &str, range: &'static str) -> PathError {
         let (file, line) = (self.file.to_owned(), self.line);
-        PathError::Header { file, line, key, value: value.to_owned(), range }
+        PathError::Header { file, line, key, value: beginning(value), range }
     }
 
     fn not_a_number(self, value: &str) -> PathError {
-        PathError::Number { file: self.file.to_owned(), line: self.line, value: value.to_owned() }
+        PathError::Number { file: self.file.to_owned(), line: self.line, value: beginning(value) }
     }
 
     /// A finite number.

@@ -55,7 +55,7 @@ use std::path::Path as FilePath;
 use collapse_log::Mesh;
 
 pub use error::{ImportError, Warning};
-pub use options::{MAX_FRAMES, MAX_RATE, Mode, Options, Up};
+pub use options::{MAX_FRAMES, MAX_RATE, Mode, Options, Up, most_frames};
 
 use super::{Path, text};
 use trajectory::Place;

@@ -13,6 +13,7 @@
 use std::io;
 use std::path::{Path, PathBuf};
 
+use crate::experiment::path::shown::beginning;
 use selection::objects::{Placement, PlacementError};
 
 /// A scene file can not be read.
@@ -97,7 +98,7 @@ pub(super) fn read_lines(path: &Path) -> Result<Vec<(usize, PathBuf, Placement)>
             *number = word.parse().map_err(|_| SceneFileError::Number {
                 file: file(),
                 line,
-                word: word.to_owned(),
+                word: beginning(word),
             })?;
             name = rest;
         }

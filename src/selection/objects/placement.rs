@@ -20,7 +20,7 @@ pub struct Placement {
 #[non_exhaustive]
 pub enum PlacementError {
     /// A number is not finite.
-    #[error("number {number} of the matrix is {value}, which is not finite")]
+    #[error("number {number} of the matrix is {value:?}, which is not finite")]
     NotFinite {
         /// Which of the twelve, from 1.
         number: usize,
@@ -28,20 +28,20 @@ pub enum PlacementError {
         value: String,
     },
     /// The matrix flattens the object.
-    #[error("the matrix has no volume: its determinant is {determinant}")]
+    #[error("the matrix has no volume: its determinant is {determinant:?}")]
     Flat {
         /// As found.
         determinant: f64,
     },
     /// The matrix mirrors the object, which would turn its triangles over.
-    #[error("the matrix mirrors: its determinant is {determinant}")]
+    #[error("the matrix mirrors: its determinant is {determinant:?}")]
     Mirrored {
         /// As found.
         determinant: f64,
     },
     /// The matrix stretches or shears the object.
     #[error(
-        "the matrix stretches or shears by {by}: only one scale, a rotation and a translation are allowed"
+        "the matrix stretches or shears by {by:?}: only one scale, a rotation and a translation are allowed"
     )]
     Stretched {
         /// Largest deviation from a rotation, as a share of the scale.

@@ -25,9 +25,11 @@ impl EventQueue {
         let (mut stored, mut valid, mut chunks) = (0, 0, 0);
         for bucket in self.buckets() {
             let mut count = 0_usize;
+            // What is pressing comes up with the next advance, cancelled or not, and is not swept.
+            let is_pressing = bucket != 0 && bucket == self.pressing;
             self.pool.read(bucket, |event| {
                 count += 1;
-                valid += usize::from(self.is_valid(event));
+                valid += usize::from(is_pressing || self.is_valid(event));
             });
             stored += count;
             chunks += count.div_ceil(CHUNK as usize);

@@ -89,7 +89,7 @@ pub enum ViewError {
 }
 
 /// See [`View::FARTHEST`](super::View::FARTHEST).
-pub(super) const FARTHEST: f64 = 1e150;
+pub(super) const FARTHEST: f64 = vertex_tree::Georeference::FARTHEST;
 
 /// How far from 1 the square of a length may be that is meant to be 1.
 const UNIT: f64 = 2e-6;

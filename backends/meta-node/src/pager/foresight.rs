@@ -55,6 +55,8 @@ impl Foresight {
     }
 
     pub fn begin_frame(&mut self) {
+        // Left over from a frame that ended in an error: whatever is named again would be there twice.
+        self.named.clear();
         self.is_sorted = false;
     }
 

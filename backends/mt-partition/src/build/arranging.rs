@@ -7,6 +7,7 @@
 
 use std::io;
 
+use collapse_log::LogError;
 use collapse_log::external::{Array, Paged, Sorter, Spool, too_few};
 use vertex_tree::{Bounds, NONE};
 
@@ -170,8 +171,8 @@ fn nested(
     let mut arcs = arcs.read_back()?;
     let mut next = arcs.next().transpose()?;
     let (mut sum, mut most) = (0.0, 1.0_f64);
-    let (mut parts, mut children) = (Vec::new(), Vec::new());
-    let mut finish = |node: u32, parts: &mut Vec<Bounds>| {
+    let (mut parts, mut children, mut beyond) = (Vec::new(), Vec::new(), None);
+    let mut finish = |node: u32, collapse: u32, parts: &mut Vec<Bounds>| {
         while next.is_some_and(|[above, ..]| above == NONE || above > node) {
             next = arcs.next().transpose()?;
         }
@@ -185,6 +186,9 @@ fn nested(
             parts.push(bounds_of(bounds.get(child as usize)?));
         }
         let nested = around(parts);
+        if !nested.is_sane() {
+            beyond = Some((collapse, nested));
+        }
         bounds.set(node as usize, words(&nested))?;
         let inflation = f64::from(nested.radius) / f64::from(largest.max(f32::MIN_POSITIVE));
         sum += inflation;
@@ -192,18 +196,23 @@ fn nested(
         parts.clear();
         io::Result::Ok(())
     };
-    let mut node = nodes.wrapping_sub(1);
-    members.finish(|[back, _, x, y, z, radius, eps]| {
+    let (mut node, mut last) = (nodes.wrapping_sub(1), 0);
+    members.finish(|[back, n, x, y, z, radius, eps]| {
         work.check()?;
         if nodes - 1 - back != node {
-            finish(node, &mut parts)?;
+            finish(node, last, &mut parts)?;
             node = nodes - 1 - back;
         }
+        last = n;
         parts.push(bounds_of([x, y, z, radius, eps]));
         Ok(())
     })?;
     if nodes > 0 {
-        finish(node, &mut parts)?;
+        finish(node, last, &mut parts)?;
+    }
+    // Spheres in the range of 32 bits need not have one around them that is.
+    if let Some((collapse, bounds)) = beyond {
+        return Err(LogError::BadBounds { collapse: collapse as usize, bounds }.into());
     }
     Ok((bounds, [sum / f64::from(nodes.max(1)), most]))
 }

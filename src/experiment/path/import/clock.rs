@@ -5,6 +5,7 @@ use std::path::Path as FilePath;
 use super::error::{ImportError, Warning};
 use crate::experiment::path::PathError;
 use crate::experiment::path::format::Line;
+use crate::experiment::path::shown::{beginning, few};
 
 /// A reading of a clock. Nanoseconds since 1970 have more digits than an f64.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -78,7 +79,7 @@ impl<'a> Clock<'a> {
         let unclear = |reason: String| ImportError::Clock {
             file: file.to_owned(),
             line: self.at.line,
-            value: self.first_text.to_owned(),
+            value: beginning(self.first_text),
             reason,
         };
         const ASK: &str = "a header can say the unit, as in `# t[ms] x y z`";
@@ -99,7 +100,8 @@ impl<'a> Clock<'a> {
             None if largest < LARGEST_SECONDS => {
                 if self.whole && step >= ABSURD {
                     return Err(unclear(format!(
-                        "can not be in seconds, with {step} from sample to sample: {ASK}"
+                        "can not be in seconds, with {} from sample to sample: {ASK}",
+                        few(step)
                     )));
                 }
                 if step >= if on_earth { DOUBTFUL_ON_EARTH } else { DOUBTFUL } {
@@ -114,7 +116,8 @@ impl<'a> Clock<'a> {
                 };
                 [1e3, 1e6, 1e9].into_iter().find(stands).ok_or_else(|| {
                     unclear(format!(
-                        "is too large for seconds, and no time since 1970 in ms, us or ns with {step} from sample to sample: {ASK}"
+                        "is too large for seconds, and no time since 1970 in ms, us or ns with {} from sample to sample: {ASK}",
+                        few(step)
                     ))
                 })?
             }

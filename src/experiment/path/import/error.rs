@@ -5,8 +5,9 @@ use std::path::PathBuf;
 use glam::DVec3;
 use thiserror::Error;
 
-use super::options::{MAX_FRAMES, MAX_RATE};
+use super::options::MAX_RATE;
 use crate::experiment::path::error::PathError;
+use crate::experiment::path::shown::few;
 use selection::view::ViewError;
 
 /// Why a trajectory could not be imported. Lines count from 1.
@@ -106,8 +107,8 @@ pub enum ImportError {
         /// The rate.
         rate: f64,
     },
-    /// The resampled trajectory would have more than [`MAX_FRAMES`] frames.
-    #[error("{}: {seconds:?} s at {rate} frames a second are more than {MAX_FRAMES} frames", file.display())]
+    /// The resampled trajectory would have more frames than [`most_frames`](super::most_frames) of so many samples.
+    #[error("{}: {seconds:?} s at {rate} frames a second are more than {most} frames", file.display())]
     TooLong {
         /// The trajectory.
         file: PathBuf,
@@ -115,9 +116,11 @@ pub enum ImportError {
         seconds: f64,
         /// The rate.
         rate: f64,
+        /// How many frames it may have.
+        most: usize,
     },
     /// The times are too large for frames to differ in them.
-    #[error("{}: {seconds} s is no time of a frame", file.display())]
+    #[error("{}: {} s is no time of a frame", file.display(), few(*seconds))]
     Late {
         /// The trajectory.
         file: PathBuf,
@@ -162,7 +165,10 @@ pub enum ImportError {
 #[non_exhaustive]
 pub enum Warning {
     /// Nothing says the unit of the times, and they are far apart for seconds.
-    #[error("{}: nothing says the unit of the times, so they are seconds, {step} between two samples", file.display())]
+    #[error(
+        "{}: nothing says the unit of the times, so they are seconds, {} between two samples",
+        file.display(), few(*step)
+    )]
     Seconds {
         /// The trajectory.
         file: PathBuf,
@@ -194,7 +200,7 @@ pub enum Warning {
     /// A path that was not fitted is nowhere near the mesh.
     #[error(
         "{}: no camera is near the mesh: the path is in {} to {}, the mesh in {} to {}",
-        file.display(), path[0], path[1], mesh[0], mesh[1]
+        file.display(), corner(path[0]), corner(path[1]), corner(mesh[0]), corner(mesh[1])
     )]
     Elsewhere {
         /// The trajectory.
@@ -204,4 +210,9 @@ pub enum Warning {
         /// Corners of the box of the mesh, in world coordinates.
         mesh: [DVec3; 2],
     },
+}
+
+fn corner(place: DVec3) -> String {
+    let [x, y, z] = place.to_array().map(few);
+    format!("[{x}, {y}, {z}]")
 }

@@ -5,6 +5,7 @@ use std::path::Path as FilePath;
 use super::error::{ImportError, Warning};
 use super::fields::{Separator, filled};
 use super::names::{Name, Role, words};
+use crate::experiment::path::shown::beginning;
 
 /// A column that is read, and what turns it into metres or degrees.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -56,7 +57,7 @@ impl Header {
         let names: Vec<&str> = self.names.iter().filter(attitude).map(|name| name.text.as_str()).collect();
         let (file, line) = (file.to_owned(), self.line);
         let unread = !names.is_empty() && self.layout.rotation.is_none();
-        unread.then(|| Warning::Attitude { file, line, names: names.join(", ") })
+        unread.then(|| Warning::Attitude { file, line, names: beginning(&names.join(", ")) })
     }
 }
 
@@ -181,12 +182,15 @@ fn layout(names: &[Name]) -> Result<Layout, String> {
         let mut best = having().filter(|(_, name)| name.rank == rank);
         match (best.next(), best.next()) {
             (Some((i, a)), Some((j, b))) => {
-                let (i, j) = (i + 1, j + 1);
-                Err(format!("columns {i} and {j}, {:?} and {:?}, could both be the {name}", a.text, b.text))
+                let (i, j, [a, b]) = (i + 1, j + 1, [a, b].map(|name| beginning(&name.text)));
+                Err(format!("columns {i} and {j}, {a:?} and {b:?}, could both be the {name}"))
             }
             (Some((index, found)), None) => match role.factor(&found.unit) {
                 Some(factor) => Ok(Some(Column { index, factor })),
-                None => Err(format!("{:?}: no unit {:?} of a {name} is known", found.text, found.unit)),
+                None => {
+                    let [text, unit] = [&found.text, &found.unit].map(|text| beginning(text));
+                    Err(format!("{text:?}: no unit {unit:?} of a {name} is known"))
+                }
             },
             _ => Ok(None),
         }

@@ -48,3 +48,10 @@ impl Default for Options {
 pub const MAX_RATE: f64 = 1000.0;
 /// The most frames that an imported path can have: about two days at 60 a second.
 pub const MAX_FRAMES: usize = 10_000_000;
+
+/// The most frames of a trajectory of so many samples: an hour at 60 a second of any, and a quarter of a minute a sample. Two lines
+/// that are days apart are not worth memory for days.
+#[must_use]
+pub fn most_frames(samples: usize) -> usize {
+    (300_000 + 1000 * samples.min(MAX_FRAMES)).min(MAX_FRAMES)
+}

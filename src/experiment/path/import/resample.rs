@@ -5,7 +5,7 @@ use std::path::Path as FilePath;
 use glam::{DQuat, DVec3};
 
 use super::error::ImportError;
-use super::options::MAX_FRAMES;
+use super::options::most_frames;
 use super::trajectory::Sample;
 
 /// Seconds between samples from which they have a gap between them, if also so many times the median.
@@ -17,8 +17,9 @@ pub(super) fn at_rate(file: &FilePath, samples: &[Sample], rate: f64) -> Result<
     let start = samples[0].time;
     let seconds = samples[samples.len() - 1].time - start;
     let frames = (seconds * rate * (1.0 + 1e-12)).floor() + 1.0;
-    if frames.is_nan() || frames > MAX_FRAMES as f64 {
-        return Err(ImportError::TooLong { file: file.to_owned(), seconds, rate });
+    let most = most_frames(samples.len());
+    if frames.is_nan() || frames > most as f64 {
+        return Err(ImportError::TooLong { file: file.to_owned(), seconds, rate, most });
     }
     let mut steps: Vec<f64> = samples.windows(2).map(|pair| pair[1].time - pair[0].time).collect();
     steps.sort_by(f64::total_cmp);
