@@ -104,7 +104,7 @@ impl MtFile {
         let end = layout.end();
         opener.check_records(&tables, end - tables.records_at)?;
         // Memory is measured by it.
-        let largest = offsets.windows(2).map(|pair| pair[1] - pair[0]).max().unwrap_or(0);
+        let largest = entries().map(|[length, _]| u64::from(length)).max().unwrap_or(0);
         if !(largest..=end - tables.records_at).contains(&header.change_bytes) {
             return Err(opener.range(104, "bytes of the largest change", header.change_bytes));
         }

@@ -76,7 +76,7 @@ pub fn meta_node(bytes: &[u8], _: &Desk) -> bool {
         assert!(!verified, "a file that is verified, and no tree");
         return true;
     };
-    if choice / 400 % 4 == 0 {
+    if (choice / 400).is_multiple_of(4) {
         tree.load_all();
     }
     let outcome = follow(tree, choice / 1600, bytes.len(), verified);
@@ -93,15 +93,15 @@ pub fn detail_block(bytes: &[u8], _: &Desk) -> bool {
     let choice = choice(bytes) >> 12;
     let hard_quota = memory(choice, file.least_memory());
     let settings = detail_block::Settings {
-        io: if choice / 4 % 3 == 0 {
+        io: if (choice / 4).is_multiple_of(3) {
             detail_block::Io::Blocking
         } else {
             detail_block::Io::Simulated(store())
         },
         prefetch: Prefetch::ALL[choice as usize / 12 % Prefetch::ALL.len()],
-        soft_quota: if choice / 60 % 2 == 0 { hard_quota } else { file.least_memory() },
+        soft_quota: if (choice / 60).is_multiple_of(2) { hard_quota } else { file.least_memory() },
         hard_quota,
-        grace: if choice / 120 % 2 == 0 { 0 } else { 180 },
+        grace: if (choice / 120).is_multiple_of(2) { 0 } else { 180 },
     };
     let Some(tree) = checked(XfmTree::new(file, settings)) else {
         assert!(!verified, "a file that is verified, and no tree");

@@ -49,7 +49,7 @@ pub fn imported(bytes: &[u8], desk: &Desk) -> bool {
     let choice = choice(bytes) >> 8;
     let mode = [Mode::Fly, Mode::Walk, Mode::Orbit][choice as usize % 3];
     let up = [None, Some(Up::Y), Some(Up::Z)][choice as usize / 3 % 3];
-    let mut options = Options { mode, rate: 0.0, up, fit: choice / 9 % 4 != 0 };
+    let mut options = Options { mode, rate: 0.0, up, fit: !(choice / 9).is_multiple_of(4) };
     let (mut taken, mut seconds) = (false, 0.0);
     for rate in RATES {
         if seconds * rate > MOST_FRAMES {

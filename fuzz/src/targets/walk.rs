@@ -46,7 +46,7 @@ pub fn follow<T: VertexTree>(tree: T, seed: u64, most: usize, verified: bool) ->
     let mut random = Pcg64::seed_from_u64(seed);
     let settings = Settings {
         strategy: Strategy::ALL[seed as usize % Strategy::ALL.len()],
-        normal_cone: seed / 5 % 4 == 0,
+        normal_cone: (seed / 5).is_multiple_of(4),
         rho: 0.02,
         ..Settings::default()
     };
@@ -61,7 +61,7 @@ pub fn follow<T: VertexTree>(tree: T, seed: u64, most: usize, verified: bool) ->
         }
     };
     let at_first = engine.sink().shape();
-    let waits = seed / 20 % 4 != 0;
+    let waits = !(seed / 20).is_multiple_of(4);
     let tolerance = [3.0, 30.0, 300.0][seed as usize / 80 % 3];
     let mut view = walk::anywhere(DVec3::ZERO, REACH, &mut random).with_k(tolerance).expect("a tolerance");
     for frame in 0..FRAMES {
