@@ -251,7 +251,7 @@ impl<S: Storage> Surface<S> {
 
 /// Joins half-edges where they make a manifold edge, and says how many edges of several triangles are none.
 fn pair_up<S: Storage>(faces: &mut Faces<S::Array<Face>>, storage: &S) -> io::Result<u64> {
-    let mut sorter = storage.sorter::<3>(40);
+    let mut sorter = storage.sorter::<3>(34);
     for t in 0..faces.0.len() {
         storage.check_stop()?;
         let start = faces.0.get(t)?.start;
