@@ -197,7 +197,9 @@ fn spheres_without_one_around_them_are_refused() {
 fn a_warning_says_places_in_few_digits() {
     let file = corpora().join("import/height-of-300-digits.csv");
     let mut ground = crate::common::bumpy_grid(5, &mut crate::common::seeded(1));
-    ground.georeference.degrees = Some(Default::default());
+    let metres_per_degree = [75_000.0, 111_000.0];
+    ground.georeference.degrees =
+        Some(foldfront::container::DegreeMap { longitude: 8.0, latitude: 47.0, metres_per_degree });
     let options = import::Options { rate: 1.0, fit: false, ..import::Options::default() };
     let mut warnings = Vec::new();
     import::import_warning(&file, &ground, &options, &mut |warning| warnings.push(warning.to_string()))
