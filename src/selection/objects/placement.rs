@@ -20,7 +20,7 @@ pub struct Placement {
 #[non_exhaustive]
 pub enum PlacementError {
     /// A number is not finite.
-    #[error("number {number} of the matrix is {value:?}, which is not finite")]
+    #[error("number {number} of the matrix is {value}, which is not finite")]
     NotFinite {
         /// Which of the twelve, from 1.
         number: usize,

@@ -173,7 +173,7 @@ fn a_log_stays_where_it_is_in_the_world() {
         germany(),
         Georeference { degrees: None, ..germany() },
         Georeference { coordinate_system: "ü".repeat(2048), ..Georeference::default() },
-        Georeference { origin: [0.0, 0.0, 1e300], ..Georeference::default() },
+        Georeference { origin: [0.0, 0.0, Georeference::FARTHEST], ..Georeference::default() },
     ];
     for georeference in cases {
         let mut log = square();
