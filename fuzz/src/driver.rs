@@ -6,8 +6,8 @@ use std::collections::BTreeMap;
 use std::fs;
 use std::panic::{self, AssertUnwindSafe, PanicHookInfo};
 use std::path::{Path, PathBuf};
-use std::sync::Mutex;
 use std::sync::atomic::{AtomicU64, Ordering};
+use std::sync::{LazyLock, Mutex};
 use std::time::{Duration, Instant};
 
 use crate::allocator;
@@ -49,7 +49,7 @@ impl Options {
 }
 
 /// The run that is under way: where its input goes if the process has to end, and the input.
-static CURRENT: Mutex<(PathBuf, Vec<u8>)> = Mutex::new((PathBuf::new(), Vec::new()));
+static CURRENT: LazyLock<Mutex<(PathBuf, Vec<u8>)>> = LazyLock::new(Mutex::default);
 /// Goes up with each run.
 static BEGUN: AtomicU64 = AtomicU64::new(0);
 
@@ -144,27 +144,15 @@ fn desk() -> Result<(Desk, PathBuf), String> {
     Ok((Desk::new(&folder), folder))
 }
 
-/// Runs a target, or all. Whether nothing was found.
+/// Runs a target. Whether nothing was found.
 pub fn run(name: &str, options: &Options) -> Result<bool, String> {
-    let chosen: Vec<&Target> =
-        targets::ALL.iter().filter(|target| name == "all" || target.name == name).collect();
-    if chosen.is_empty() {
+    let Some(target) = targets::ALL.iter().find(|target| target.name == name) else {
         return Err(format!("no target {name}"));
-    }
+    };
     let (desk, folder) = desk()?;
     watch();
     listen();
-    let share = 60.0 * options.minutes / chosen.len() as f64;
-    let mut finds = 0;
-    for target in chosen {
-        finds += run_one(target, options, share, &desk)?;
-    }
-    // Nothing is lost if it stays.
-    let _ = fs::remove_dir_all(folder);
-    Ok(finds == 0)
-}
-
-fn run_one(target: &Target, options: &Options, seconds: f64, desk: &Desk) -> Result<u64, String> {
+    let seconds = 60.0 * options.minutes;
     let inputs =
         Inputs::new(target.name, options.seed).map_err(|error| format!("{}: {error}", target.name))?;
     let begin = Instant::now();
@@ -178,7 +166,7 @@ fn run_one(target: &Target, options: &Options, seconds: f64, desk: &Desk) -> Res
         }
         let input = inputs.get(run);
         let path = options.finds.join(target.name).join(format!("seed-{}-run-{run}", options.seed));
-        match one(target, &input, path.clone(), desk) {
+        match one(target, &input, path, &desk) {
             Ok(was_taken) => taken += u64::from(was_taken),
             Err(what) => {
                 finds += 1;
@@ -205,7 +193,9 @@ fn run_one(target: &Target, options: &Options, seconds: f64, desk: &Desk) -> Res
         100.0 * taken as f64 / run.max(1) as f64,
         places.len()
     );
-    Ok(finds)
+    // Nothing is lost if it stays.
+    let _ = fs::remove_dir_all(folder);
+    Ok(finds == 0)
 }
 
 /// Runs files again. Whether nothing was found.

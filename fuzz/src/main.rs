@@ -15,9 +15,9 @@ use std::process::ExitCode;
 
 const HELP: &str = "\
 fuzz list                        names the targets
-fuzz run TARGET|all [OPTIONS]    runs a target, or each in turn
+fuzz run TARGET [OPTIONS]        runs a target; `.ci/fuzz` runs each in turn
     --runs N                     so many runs, at most
-    --minutes M                  so long, at most; all targets together
+    --minutes M                  so long, at most
     --seed S                     other inputs (1)
     --finds FOLDER               where inputs that are finds are written (finds)
 fuzz replay FILE...              runs inputs again; the name of a file's folder says the target

@@ -11,7 +11,7 @@ use foldfront::experiment::store::{self, Backend, BuildOptions, Store};
 use foldfront::experiment::stored_scene::read_scene;
 
 #[path = "../../fuzz/src/targets/mod.rs"]
-mod targets;
+pub mod targets;
 
 fn corpora() -> PathBuf {
     Path::new(env!("CARGO_MANIFEST_DIR")).join("fuzz/corpora")

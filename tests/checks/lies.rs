@@ -1,11 +1,6 @@
 //! Files that lie with checksums that agree: pages that contradict themselves or each other. A front over them may stay coarse, or end
 //! in an error that says so; it never panics, hangs, shows what can not be, or grows without end.
 
-use foldfront::selection::engine::{Engine, Settings};
-use foldfront::vertex_tree::VertexTree;
-
-use crate::common::{random_step, random_view, seeded};
-use foldfront::testing::strict_mesh::StrictMesh;
 use rand::RngExt;
 use rand_pcg::Pcg64;
 
@@ -45,47 +40,4 @@ pub fn tell_lies(bytes: &mut [u8], pages: &[(usize, usize)], random: &mut Pcg64)
         let sum = crc32fast::hash(&bytes[start + 4..start + length]);
         put(bytes, start, sum);
     }
-}
-
-/// What came of following a front over a file.
-#[derive(Debug, Default)]
-pub struct Outcome {
-    /// Frames that ended in an error.
-    pub errors: u64,
-    /// Pages that were read in vain, or contradict others.
-    pub faults: u64,
-}
-
-impl Outcome {
-    /// Whether nothing was wrong.
-    pub fn is_clean(&self) -> bool {
-        self.errors + self.faults == 0
-    }
-}
-
-/// Follows a walk. No more than so many triangles can be displayed at a time, or be left behind.
-pub fn follow<T: VertexTree>(tree: T, seed: u64, most: usize) -> Outcome {
-    let mut random = seeded(seed);
-    let settings = Settings { rho: 0.02, ..Settings::default() };
-    let mut engine = Engine::new(tree, StrictMesh::default(), settings).unwrap();
-    let mut view = random_view(&mut random).with_k([3.0, 30.0, 300.0][seed as usize % 3]).unwrap();
-    let mut outcome = Outcome::default();
-    for frame in 0..60 {
-        random_step(&mut view, &mut random);
-        // There and back, so that everything unfolds and folds a few times.
-        let view = if frame % 20 < 12 { view.with_k(1e4).unwrap() } else { view };
-        match engine.advance(&[view]) {
-            Ok(report) => outcome.faults += report.pages.faults,
-            Err(error) => {
-                assert!(!error.to_string().is_empty());
-                outcome.errors += 1;
-            }
-        }
-        let displayed = engine.sink().triangles.len();
-        assert!(displayed <= most, "{displayed} triangles are displayed in frame {frame}");
-        if engine.tree_mut().settle().is_err() {
-            outcome.errors += 1;
-        }
-    }
-    outcome
 }

@@ -27,14 +27,11 @@ fn assert_faults_are_said(place: &Workplace, output: &Output, file: &str) -> u64
     assert!(complaint.contains("offset") && complaint.contains("was not displayed"), "{complaint}");
     let table = String::from_utf8_lossy(&output.stdout);
     assert!(table.contains("faults"), "{table}");
-    let sum = |name: &str| -> u64 {
-        let text = place.text(&format!("results/{name}"));
-        let mut rows = csv::Reader::from_reader(text.as_bytes());
-        let column = rows.headers().unwrap().iter().position(|name| name == "faults").unwrap();
-        rows.records().map(|row| row.unwrap()[column].parse::<u64>().unwrap()).sum()
+    let sum = |table: &str| -> u64 {
+        place.column(table, "faults").iter().map(|faults| faults.parse::<u64>().unwrap()).sum()
     };
-    let faults = sum("summary.csv");
-    assert_eq!(sum("frames.csv"), faults);
+    let faults = sum("results/summary.csv");
+    assert_eq!(sum("results/frames.csv"), faults);
     let report = place.text("results/report.html");
     assert!(report.contains("<th>faults") && report.contains("was not displayed"), "{file}");
     faults

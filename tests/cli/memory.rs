@@ -147,10 +147,7 @@ fn page_memory_is_a_limit() {
         let peak = |how: &str| -> u64 {
             let all = format!("compare {file} --frames 0..5 --strategy front --out results {how}");
             place.succeed(&all);
-            let text = place.text("results/summary.csv");
-            let mut rows = csv::Reader::from_reader(text.as_bytes());
-            let at = rows.headers().unwrap().iter().position(|name| name == "peak_resident_bytes").unwrap();
-            rows.records().next().unwrap().unwrap()[at].parse().unwrap()
+            place.column("results/summary.csv", "peak_resident_bytes")[0].parse().unwrap()
         };
         // What is there beside pages, or with the first of them.
         let least = peak("--pixels 1000000");
@@ -185,15 +182,11 @@ fn resident_memory_keeps_to_the_limit() {
             let options = "--strategy event --frames 0..240 --pixels 8 --out results";
             peak(place.command(&format!("compare {size}.{backend} {options} {memory}")))
         };
-        let displayed = || -> u64 {
-            let text = place.text("results/frames.csv");
-            let mut rows = csv::Reader::from_reader(text.as_bytes());
-            let at = rows.headers().unwrap().iter().position(|name| name == "triangles").unwrap();
-            rows.records().map(|row| row.unwrap()[at].parse().unwrap()).max().unwrap()
-        };
         let limit = length / 30;
         let (tiny, limited) = (run("tiny", ""), run("large", &format!("--page-memory {limit}")));
-        let most = tiny + limit + 16 * pages + 4 * nodes + 256 * displayed() + (1 << 20);
+        let triangles = place.column("results/frames.csv", "triangles");
+        let displayed = triangles.iter().map(|count| count.parse::<u64>().unwrap()).max().unwrap();
+        let most = tiny + limit + 16 * pages + 4 * nodes + 256 * displayed + (1 << 20);
         println!(
             "{backend}: {length} bytes, {tiny} over a tiny file, {limited} within {limit}, at most {most}"
         );

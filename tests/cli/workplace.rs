@@ -114,6 +114,13 @@ impl Workplace {
         assert_eq!(self.everything(), before, "{name}: the folder has changed");
     }
 
+    /// A column of a table that `compare` has written, row by row.
+    pub fn column(&self, table: &str, name: &str) -> Vec<String> {
+        let mut rows = csv::Reader::from_path(self.file(table)).unwrap();
+        let at = rows.headers().unwrap().iter().position(|column| column == name).unwrap();
+        rows.records().map(|row| row.unwrap()[at].to_owned()).collect()
+    }
+
     /// All files and folders, with the contents of the files.
     pub fn everything(&self) -> BTreeMap<PathBuf, Option<Vec<u8>>> {
         let mut found = BTreeMap::new();

@@ -9,7 +9,7 @@ mod mesh;
 mod paging;
 mod path;
 mod scene;
-mod walk;
+pub mod walk;
 
 use std::cell::OnceCell;
 use std::path::{Path, PathBuf};

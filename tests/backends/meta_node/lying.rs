@@ -10,7 +10,8 @@ use meta_node::{BuildOptions, Dependencies, InUse, Io, MetaNodeFile, MetaNodeTre
 use super::grid;
 use crate::common::backends::meta_node_bytes;
 use crate::common::seeded;
-use crate::lies::{follow, put, section, tell_lies, word};
+use crate::corpora::targets::walk::follow;
+use crate::lies::{put, section, tell_lies, word};
 
 fn open(bytes: Vec<u8>) -> Option<Arc<MetaNodeFile>> {
     MetaNodeFile::open(Arc::new(MemorySource::new("lies", bytes))).ok().map(Arc::new)
@@ -49,7 +50,7 @@ fn pages_that_lie_are_faults() {
         let verified = file.verify().is_ok();
         found += u32::from(!verified);
         let tree = MetaNodeTree::new(file.clone(), settings(seed, &file)).unwrap();
-        let outcome = follow(tree, seed, 2000);
+        let outcome = follow(tree, seed, 2000, verified);
         faults += u32::from(outcome.faults > 0);
         errors += u32::from(outcome.errors > 0);
         assert!(
@@ -83,7 +84,7 @@ fn leaves_that_lie_are_told() {
             let settings = settings(seed, &file);
             let mut tree = MetaNodeTree::new(file, settings).unwrap();
             tree.load_all();
-            let outcome = follow(tree, seed, 2000);
+            let outcome = follow(tree, seed, 2000, false);
             // With little memory, the page may never come, and the pages around it not with it.
             if settings.page_memory == u64::MAX {
                 told += u32::from(outcome.faults + outcome.errors > 0);

@@ -12,7 +12,8 @@ use mt_partition::{
 
 use super::{all_around, ball_log, finest};
 use crate::common::seeded;
-use crate::lies::{Outcome, follow, put, section, tell_lies, word};
+use crate::corpora::targets::walk::{Outcome, follow};
+use crate::lies::{put, section, tell_lies, word};
 use foldfront::testing::strict_mesh::StrictMesh;
 
 /// A small file with several partitions, and where its nodes start.
@@ -138,7 +139,7 @@ fn nodes_that_lie_are_faults() {
         let reader = Some(Reader::simulated(store));
         let settings = Settings { cache, memory, reader, ..Settings::default() };
         let Ok(tree) = MtTree::new(Arc::new(file), settings) else { continue };
-        let outcome = follow(tree, seed, 2000);
+        let outcome = follow(tree, seed, 2000, verified);
         assert_eq!(outcome.errors, 0, "seed {seed}");
         faults += u32::from(outcome.faults > 0);
         assert!(
@@ -171,7 +172,7 @@ fn arcs_with_one_end_are_faults() {
             assert!(file.verify().is_err());
             let reader = Some(Reader::simulated(Simulated::with_latency(Duration::from_millis(5))));
             let tree = MtTree::new(Arc::new(file), Settings { reader, ..Settings::default() }).unwrap();
-            let Outcome { errors, faults } = follow(tree, 1, 2000);
+            let Outcome { errors, faults, .. } = follow(tree, 1, 2000, false);
             assert_eq!(errors, 0);
             assert!(faults > 0, "node {node}: an arc {}", if is_above { "above" } else { "below" });
             *(if is_above { &mut above } else { &mut below }) += 1;
