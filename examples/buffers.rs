@@ -96,8 +96,7 @@ pub fn main() -> Result<(), Box<dyn std::error::Error>> {
     options.merge_components = true;
     let (log, _) = simplify::build(mesh, &options, &mut |_, _| ())?;
     let tree = InMemoryTree::new(Arc::new(InMemoryHierarchy::new(&log)?));
-    let settings = Settings { rho: 5.0, omega: 0.02, ..Settings::default() };
-    let mut engine = Engine::new(tree, ActiveMesh::new(), settings)?;
+    let mut engine = Engine::new(tree, ActiveMesh::new(), Settings::default())?;
     let mut drawable = Drawable::default();
     let (mut patched, mut whole) = (0, 0);
     for frame in 0..120 {

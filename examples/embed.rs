@@ -18,8 +18,7 @@ pub fn main() -> Result<(), Box<dyn std::error::Error>> {
     let mesh = Scene::parse("scene:city")?.mesh(&mut |_, _| ());
     let (log, _) = simplify::build(mesh, &simplify::Options::default(), &mut |_, _| ())?;
     let tree = InMemoryTree::new(Arc::new(InMemoryHierarchy::new(&log)?));
-    let settings = Settings { rho: 1.0, omega: 0.02, ..Settings::default() };
-    let mut engine = Engine::new(tree, ActiveMesh::new(), settings)?;
+    let mut engine = Engine::new(tree, ActiveMesh::new(), Settings::default())?;
     for frame in 0..240 {
         let eye = DVec3::new(-1200.0 + 5.0 * f64::from(frame), -800.0, 250.0);
         let camera = Camera::look_at(eye, DVec3::new(0.0, 0.0, 20.0), DVec3::Z, 1.0, 16.0 / 9.0)?;

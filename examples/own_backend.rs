@@ -168,8 +168,7 @@ mod disc {
 
 /// Flies along the rim, ever closer, and says how round it is.
 pub fn main() -> Result<(), Box<dyn std::error::Error>> {
-    let settings = Settings { rho: 0.02, omega: 0.02, ..Settings::default() };
-    let mut engine = Engine::new(disc::Disc::new(), ActiveMesh::new(), settings)?;
+    let mut engine = Engine::new(disc::Disc::new(), ActiveMesh::new(), Settings::default())?;
     for frame in 0..400 {
         let angle = 0.01 * f64::from(frame);
         let height = 0.5 * 0.97_f64.powi(frame);

@@ -33,12 +33,10 @@ impl PointSink for Buffers {
 pub fn main() -> Result<(), Box<dyn std::error::Error>> {
     let survey = Scene::new(SceneKind::Laserscan).mesh(&mut |_, _| ()).positions;
     let [path, _] = recorded(SceneKind::Laserscan)?;
-    let usual = path.motion_percentile(99.0);
-    let settings = Settings { rho: usual.rho, omega: usual.omega, ..Settings::default() };
     let mut whole = PointTree::new(&survey);
     whole.start(&mut NullSink)?;
     let mut brute_force = BruteForce::new(&mut whole)?;
-    let mut engine = Engine::new(PointTree::new(&survey), Buffers::default(), settings)?;
+    let mut engine = Engine::new(PointTree::new(&survey), Buffers::default(), Settings::default())?;
     let (mut tests, mut changes) = (0, 0);
     for frame in 0..path.frames.len() {
         // A point a pixel and a half.

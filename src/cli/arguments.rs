@@ -181,7 +181,7 @@ pub(super) struct Compare {
     /// Replay only these frames.
     #[arg(long, value_name = "A..B", value_parser = frames)]
     pub frames: Option<Range<usize>>,
-    /// top-down, front, event, event-published; by default all.
+    /// top-down, front, event, event-published, event-queue; by default all but the last.
     #[arg(long, value_delimiter = ',', value_name = "LIST", value_parser = strategy)]
     pub strategy: Vec<Strategy>,
     /// in-memory, meta-node, detail-block, mt-partition: where inputs are kept, each built on the fly; by default
@@ -230,10 +230,12 @@ pub(super) struct Compare {
     /// Do no more in a frame than N folds and unfolds, or than fit a time such as 200us; the rest is carried over.
     #[arg(long, value_name = "N", value_parser = work_cap)]
     pub work_cap: Option<WorkCap>,
-    /// Full speed of the eye in object units a frame; by default the path's 99th percentile.
+    /// Full speed of the eye in object units a frame, for event-queue and event-published; by default the path's 99th
+    /// percentile.
     #[arg(long, value_parser = positive)]
     pub rho: Option<f64>,
-    /// Full speed of turning in radians a frame; by default the path's 99th percentile.
+    /// Full speed of turning in radians a frame, for event-queue and event-published; by default the path's 99th
+    /// percentile.
     #[arg(long, value_parser = positive)]
     pub omega: Option<f64>,
     /// Join near components of meshes that are simplified for this, as with `build`.

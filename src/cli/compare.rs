@@ -322,7 +322,7 @@ fn options(command: &Compare) -> Options {
         (None, None) => Budget::None,
     };
     let strategies =
-        if command.strategy.is_empty() { Strategy::ALL.to_vec() } else { command.strategy.clone() };
+        if command.strategy.is_empty() { Strategy::COMPARED.to_vec() } else { command.strategy.clone() };
     Options {
         strategies,
         criterion: command.refinement.criterion.into(),

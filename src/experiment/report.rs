@@ -144,7 +144,15 @@ impl Report {
     /// One line a replay: who is fastest, and by how much.
     fn overview(&self, html: &mut String) {
         html.push_str("<table>\n<tr><th>scene<th>backend<th>prefetch<th>path<th>frames");
-        for strategy in Strategy::ALL {
+        let is_there = |strategy: &Strategy| {
+            let mut runs = self.sections.iter().flat_map(|section| &section.runs);
+            runs.any(|run| run.strategy == *strategy)
+        };
+        let strategies: Vec<Strategy> = Strategy::ALL
+            .into_iter()
+            .filter(|strategy| Strategy::COMPARED.contains(strategy) || is_there(strategy))
+            .collect();
+        for strategy in &strategies {
             let _ = write!(html, "<th>{}, median µs", strategy.name());
         }
         html.push_str("<th>event vs top-down<th>misses, % of flips\n");
@@ -160,7 +168,7 @@ impl Report {
                 escape(&runs[0].path),
                 runs[0].rows.len()
             );
-            for strategy in Strategy::ALL {
+            for &strategy in &strategies {
                 let _ = write!(html, "<td>{}", median(strategy).map_or_else(String::new, microseconds));
             }
             let ratio =

@@ -28,7 +28,7 @@ use crate::criterion::Criterion;
 use crate::foresight::{Foresight, Watched};
 use crate::front::Front;
 use crate::in_play::{Kind, Slot};
-use crate::motion::{Odometer, Speed};
+use crate::motion::{Motion, Odometer, Speed, Travel};
 use crate::normal_cone::Cones;
 use crate::refine::{Finder, Flips, Frame, Strategy, Watch};
 use crate::view::{View, check_origin};
@@ -44,11 +44,12 @@ pub struct Settings {
     /// Whether a node is only unfolded for views that do not see all below it from behind, where the backend knows
     /// ([`Hierarchy::HAS_CONES`](vertex_tree::Hierarchy::HAS_CONES)).
     pub normal_cone: bool,
-    /// Declared full speed of the eye, in object units a frame. It decides how far ahead the event queue looks, never
-    /// the cut. 0, or what is no number above 0, says that the eye is not expected to move: a frame in which it does
-    /// tests everything that is watched.
+    /// Full speed of the eye, in object units a frame. [`Strategy::Event`] needs none: it learns from the motion.
+    /// [`Strategy::EventQueue`] and [`Strategy::EventPublished`] go by it; it decides how far ahead they look, and of exact
+    /// strategies never the cut. 0, or what is no number above 0, says that the eye is not expected to move: a frame in which
+    /// it does tests everything that is watched. Foresight takes what is slower than a share of it for a motion that has begun.
     pub rho: f64,
-    /// Declared full speed of turning, in radians a frame; 0 says that the camera is not expected to turn, as with
+    /// Full speed of turning, in radians a frame, for the same; 0 says that the camera is not expected to turn, as with
     /// `rho`. (`kappa` is the engine's own, see [`Speed::kappa`].)
     pub omega: f64,
     /// What a frame may cost.
@@ -61,7 +62,8 @@ pub struct Settings {
 }
 
 impl Default for Settings {
-    /// Event-driven, screen error, no budget, and full speeds of 1 object unit and 0.02 radians a frame.
+    /// Event-driven, screen error, no budget; full speeds of 1 object unit and 0.02 radians a frame for the strategies that go
+    /// by them.
     fn default() -> Self {
         Self {
             strategy: Strategy::Event,
@@ -210,7 +212,9 @@ impl<T: Refine<S>, S> Engine<T, S> {
             criterion: settings.criterion,
             views: &[],
             speed: Speed { rho: settings.rho, omega: settings.omega, kappa: 0.0 },
-            motion: crate::motion::Motion::Unbounded,
+            motion: Motion::Unbounded,
+            travel: None,
+            looks_ahead: false,
             cones: None,
         };
         for root in front.roots() {
@@ -358,12 +362,15 @@ impl<T: Refine<S>, S> Engine<T, S> {
             self.kappa = kappa;
         }
         let speed = Speed { rho: self.settings.rho, omega: self.settings.omega, kappa: self.kappa };
-        let mut motion = self.odometer.advance(&speed.into(), &self.before, &self.views);
+        let travel = Travel::between(&self.before, &self.views);
+        let mut motion = self.odometer.advance_by(&speed.into(), travel.as_ref());
         if redeclared {
-            motion = crate::motion::Motion::Unbounded;
+            motion = Motion::Unbounded;
         }
         let cones = (T::HAS_CONES && self.settings.normal_cone).then_some(&self.cones);
-        let frame = Frame { criterion: self.settings.criterion, views: &self.views, speed, motion, cones };
+        let criterion = self.settings.criterion;
+        let looks_ahead = self.tree.look_ahead() > 0;
+        let frame = Frame { criterion, views: &self.views, speed, motion, travel, looks_ahead, cones };
 
         self.flips.unfold.clear();
         self.flips.fold.clear();

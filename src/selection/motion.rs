@@ -119,10 +119,7 @@ impl Odometer {
 
     /// Advances by the motion from the views of the last frame to those of this one.
     pub fn advance(&mut self, course: &Course, before: &[View], after: &[View]) -> Motion {
-        match Travel::between(before, after) {
-            Some(travel) => self.advance_by(course, &travel),
-            None => Motion::Unbounded,
-        }
+        self.advance_by(course, Travel::between(before, after).as_ref())
     }
 
     /// The time after a motion; infinite where no declared speed covers it.
@@ -134,9 +131,9 @@ impl Odometer {
         }
     }
 
-    /// Advances by a motion.
-    pub(crate) fn advance_by(&mut self, course: &Course, travel: &Travel) -> Motion {
-        let motion = travel.on_course(course);
+    /// Advances by a motion; `None` is one between views that can not be compared.
+    pub(crate) fn advance_by(&mut self, course: &Course, travel: Option<&Travel>) -> Motion {
+        let motion = travel.map_or(Motion::Unbounded, |travel| travel.on_course(course));
         if let Motion::Frames(frames) = motion {
             // Millions of small steps must not be rounded away either.
             self.now = (self.now + frames).next_up();

@@ -92,6 +92,23 @@ impl Packed {
     /// The blocks, each with how many of its entries are in use: all, but for the last.
     #[inline]
     pub fn blocks(&self) -> impl Iterator<Item = (&Block, usize)> {
-        self.blocks.iter().enumerate().map(|(i, block)| (block, (self.len - i * LANES).min(LANES)))
+        self.blocks.iter().enumerate().map(|(i, block)| (block, self.used(i)))
+    }
+
+    /// How many blocks there are.
+    #[inline]
+    pub fn count(&self) -> usize {
+        self.blocks.len()
+    }
+
+    /// One of the blocks, and how many of its entries are in use.
+    #[inline]
+    pub fn block(&self, at: usize) -> Option<(&Block, usize)> {
+        self.blocks.get(at).map(|block| (block, self.used(at)))
+    }
+
+    #[inline]
+    fn used(&self, at: usize) -> usize {
+        (self.len - at * LANES).min(LANES)
     }
 }

@@ -105,6 +105,11 @@ impl EventQueue {
         self.stored
     }
 
+    /// A lower bound on it.
+    pub(crate) fn least_len(&self) -> usize {
+        self.stored.saturating_sub(self.cancelled)
+    }
+
     /// Whether no event is scheduled.
     #[must_use]
     pub fn is_empty(&self) -> bool {

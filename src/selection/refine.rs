@@ -23,16 +23,22 @@ pub enum Strategy {
     TopDown,
     /// Scan all boundary and all collapsible nodes, every frame, in a packed array.
     Front,
-    /// Test a node only when the camera could have changed the answer: an event queue on an odometer clock.
+    /// Test a node only when the camera could have changed the answer: an event queue on odometer clocks, and a scan of what
+    /// is due so soon that a place in the queue is not worth it. It needs no declared speeds.
     Event,
     /// The event queue as published, with its time bounds, integer frames and lists of nodes. It misses flips: its
     /// bounds are not conservative. For comparison.
     EventPublished,
+    /// The event queue alone, by declared speeds and without a scan. For comparison.
+    EventQueue,
 }
 
 impl Strategy {
     /// All of them, in the order of reports.
-    pub const ALL: [Self; 4] = [Self::TopDown, Self::Front, Self::Event, Self::EventPublished];
+    pub const ALL: [Self; 5] =
+        [Self::TopDown, Self::Front, Self::Event, Self::EventPublished, Self::EventQueue];
+    /// Those that are compared where nothing else is said.
+    pub const COMPARED: [Self; 4] = [Self::TopDown, Self::Front, Self::Event, Self::EventPublished];
 
     /// The name on the command line and in files.
     #[must_use]
@@ -41,6 +47,7 @@ impl Strategy {
             Self::TopDown => "top-down",
             Self::Front => "front",
             Self::Event => "event",
+            Self::EventQueue => "event-queue",
             Self::EventPublished => "event-published",
         }
     }
@@ -78,6 +85,7 @@ impl Finder {
             Strategy::TopDown => Self::TopDown(top_down::TopDown::default()),
             Strategy::Front => Self::Front(front::FrontScan::default()),
             Strategy::Event => Self::Event(Box::new(event::EventDriven::new())),
+            Strategy::EventQueue => Self::Event(Box::new(event::EventDriven::queue_alone())),
             Strategy::EventPublished => Self::Published(published::Published::default()),
         }
     }
@@ -87,7 +95,7 @@ impl Finder {
         match self {
             Self::TopDown(s) => s.find(frame, front, flips),
             Self::Front(s) => s.find(frame, flips),
-            Self::Event(s) => s.find(frame, before, flips),
+            Self::Event(s) => s.find(frame, flips),
             Self::Published(s) => s.find(frame, before, front, flips),
         }
     }

@@ -4,23 +4,22 @@
 use std::path::Path as FilePath;
 use std::sync::OnceLock;
 
-use crate::common::{data, meshes, seeded, trajectories};
+use crate::common::{data, meshes, scenes, seeded, trajectories};
 use crate::walks::{Length, follow, pixels};
 use foldfront::experiment::path::import::{Mode, Options, import_text};
 use foldfront::experiment::path::recorded;
-use foldfront::experiment::scene::{Scene, SceneKind};
+use foldfront::experiment::scene::SceneKind;
 use foldfront::selection::criterion::Criterion;
 use foldfront::{CollapseLog, Mesh};
 
-/// The first frames are for all backends. That the others follow the same cuts in the rest is frozen, see
+/// The first frames are for all backends. That they follow the same cuts in the rest, with every strategy, is frozen, see
 /// `tests/experiment/frozen/cuts.rs`; and all do in all frames of the walks over real data.
-const WITH_ALL: usize = 300;
+const WITH_ALL: usize = 100;
 
 fn recorded_paths(kind: SceneKind) {
-    let scene = Scene::new(kind);
-    let log = data::log(scene.mesh(&mut |_, _| ()));
+    let log = scenes::log(kind);
     for path in recorded(kind).unwrap() {
-        follow(&log, &path, pixels(1.0), WITH_ALL, 20_000);
+        follow(log, &path, pixels(1.0), WITH_ALL, 20_000);
     }
 }
 

@@ -167,7 +167,7 @@ fn files_may_change_under_a_replay() {
         ("removed", |place, file| std::fs::remove_file(place.file(file)).unwrap()),
     ];
     let place = place();
-    place.write("long.path", long_path(800));
+    place.write("long.path", long_path(200));
     let mut running = 0;
     for (backend, file) in [("meta-node", "x.meta"), ("detail-block", "x.xfm"), ("mt-partition", "x.mt")] {
         place.succeed(&format!("build waves.ply --backend {backend} -o {file}"));

@@ -154,7 +154,7 @@ fn a_command_that_is_not_understood_has_exit_code_2() {
         ("build grid.ply -o out.log --fast", &["'--fast'"]),
         (
             "compare grid.ply --strategy best --out results",
-            &["'best'", "top-down, front, event, event-published"],
+            &["'best'", "top-down, front, event, event-published, event-queue"],
         ),
         ("compare grid.ply --strategy event,best --out results", &["'best'"]),
         ("compare grid.ply --frames 7..3 --out results", &["'7..3'", "A..B"]),

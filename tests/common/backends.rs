@@ -231,7 +231,7 @@ pub struct Totals {
     /// Unfolds and folds.
     pub changes: u64,
     /// Tests of the criterion that the event queue made.
-    pub event_tests: u64,
+    pub queue_tests: u64,
     /// Nodes that the oracle tested.
     pub oracle_tests: u64,
     /// The smallest and the largest number of triangles displayed.
@@ -250,9 +250,10 @@ pub struct Conformance<'a> {
 /// The triangles are counted by brute force once in so many frames.
 const COUNT_EVERY: u64 = 251;
 
-/// The state of the engines is checked in so many frames, and then once in so many: a check takes longer than a frame.
-const EVERY_FRAME: u64 = 100;
-const CHECK_EVERY: u64 = 101;
+/// The state of all engines is checked in so many frames, and then that of each once in so many, in turns: a check takes
+/// longer than a frame.
+const EVERY_FRAME: u64 = 10;
+const CHECK_EVERY: u64 = 29;
 
 impl<'a> Conformance<'a> {
     pub fn new(log: &'a CollapseLog, settings: Settings) -> Self {
@@ -304,9 +305,10 @@ impl<'a> Conformance<'a> {
         let Self { log, settings, oracle, followers, totals } = self;
         let reports: Vec<FrameReport> =
             followers.iter_mut().map(|(_, follower)| follower.advance(views)).collect();
-        if totals.frames < EVERY_FRAME || totals.frames.is_multiple_of(CHECK_EVERY) {
-            followers.iter().for_each(|(_, follower)| follower.assert_well_formed());
-        }
+        let turn = (totals.frames % CHECK_EVERY) as usize;
+        let checked = if totals.frames < EVERY_FRAME { 0..followers.len() } else { turn..turn + 1 };
+        let checked = followers.iter().take(checked.end).skip(checked.start);
+        checked.for_each(|(_, follower)| follower.assert_well_formed());
         // A budget in triangles steers all alike.
         oracle.cut(settings.criterion, followers[0].1.views());
         let (hash, nodes) = (oracle.cut_hash(), oracle.active_nodes() as u64);
@@ -325,8 +327,8 @@ impl<'a> Conformance<'a> {
             if (report.cut_hash, report.active_nodes) != (hash, nodes) {
                 panic!("{}: {}; views {:?}", name(), follower.difference(oracle), follower.views());
             }
-            if follower.strategy() == Strategy::Event {
-                totals.event_tests += report.tests;
+            if follower.strategy() == Strategy::EventQueue {
+                totals.queue_tests += report.tests;
             }
         }
         if frame.is_multiple_of(COUNT_EVERY) {

@@ -4,12 +4,12 @@
 use std::collections::HashMap;
 
 use foldfront::Mesh;
-use foldfront::experiment::scene::{Scene, SceneKind};
+use foldfront::experiment::scene::SceneKind;
 use glam::DVec3;
 use rand::RngExt;
 use rand_pcg::Pcg64;
 
-use super::direction;
+use super::{direction, scenes};
 
 /// Noise that is smooth between the corners of a lattice of spacing 1: in -1..1, of mean 0.
 fn noise(p: DVec3, seed: u64) -> f64 {
@@ -239,7 +239,7 @@ pub fn ground(side: usize, voids: usize, random: &mut Pcg64) -> Mesh {
 
 /// What is wholly within the middle of a built-in scene, `share` of its width and depth.
 pub fn part_of(kind: SceneKind, share: f32) -> Mesh {
-    let mut mesh = Scene::new(kind).mesh(&mut |_, _| ());
+    let mut mesh = scenes::mesh(kind).clone();
     let (low, high) = mesh.bounding_box().unwrap();
     let is_within = |v: u32| {
         let p = mesh.positions[v as usize];

@@ -9,6 +9,7 @@ pub mod graph_cut;
 pub mod meshes;
 #[path = "../../examples/points/quadtree.rs"]
 pub mod quadtree;
+pub mod scenes;
 pub mod trajectories;
 
 use foldfront::selection::view::View;

@@ -46,7 +46,7 @@ fn stores(log: &CollapseLog) -> [Store; 3] {
 
 fn options(prefetch: &[Loading], pace: Pace) -> Options {
     Options {
-        strategies: Strategy::ALL.into_iter().filter(|strategy| strategy.is_exact()).collect(),
+        strategies: Strategy::COMPARED.into_iter().filter(|strategy| strategy.is_exact()).collect(),
         theta: theta_of_pixels(4.0, 1080),
         check: true,
         prefetch: prefetch.to_vec(),

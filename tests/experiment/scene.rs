@@ -5,7 +5,10 @@ use std::collections::HashMap;
 use foldfront::Mesh;
 use foldfront::experiment::scene::{Scene, SceneError, SceneKind};
 
-fn mesh(name: &str) -> Mesh {
+use crate::common::scenes;
+
+/// A scene at a scale other than its own.
+fn finer(name: &str) -> Mesh {
     Scene::parse(name).unwrap().mesh(&mut |_, _| ())
 }
 
@@ -69,11 +72,11 @@ fn assert_sound(mesh: &Mesh) {
 
 #[test]
 fn the_city_has_the_size_of_graz_and_closed_buildings() {
-    let city = mesh("scene:city");
-    assert_sound(&city);
+    let city = scenes::mesh(SceneKind::City);
+    assert_sound(city);
     assert_within(city.triangles.len() as f64, 162_146.0, 0.03);
     assert_within(city.extent(), 2970.0, 0.03);
-    let components = components(&city);
+    let components = components(city);
     assert!((3000..=5000).contains(&components.len()), "{} components", components.len());
     let open: Vec<_> = components.iter().filter(|(_, closed)| !closed).collect();
     assert_eq!(open.len(), 1, "only the ground is open");
@@ -82,11 +85,11 @@ fn the_city_has_the_size_of_graz_and_closed_buildings() {
 
 #[test]
 fn a_finer_city_is_the_same_city() {
-    let (city, finer) = (mesh("scene:city"), mesh("scene:city@3"));
+    let (city, finer) = (scenes::mesh(SceneKind::City), finer("scene:city@3"));
     assert_sound(&finer);
     assert_within(finer.triangles.len() as f64, 9.0 * city.triangles.len() as f64, 0.06);
     assert_within(finer.extent(), city.extent(), 1e-3);
-    let (coarse, fine) = (components(&city), components(&finer));
+    let (coarse, fine) = (components(city), components(&finer));
     assert_eq!(coarse.len(), fine.len());
     assert_eq!(fine.iter().filter(|(_, closed)| !closed).count(), 1);
     assert!(fine.iter().all(|&(volume, closed)| !closed || volume > 50.0));
@@ -94,11 +97,11 @@ fn a_finer_city_is_the_same_city() {
 
 #[test]
 fn the_alps_have_the_size_of_styria_and_scales_share_samples() {
-    let alps = mesh("scene:alps");
-    assert_sound(&alps);
+    let alps = scenes::mesh(SceneKind::Alps);
+    assert_sound(alps);
     assert_eq!(alps.triangles.len(), 524_288);
     assert_within(alps.extent(), 73_704.0, 1e-4);
-    let finer = mesh("scene:alps@2");
+    let finer = finer("scene:alps@2");
     assert_eq!(finer.triangles.len(), 4 * 524_288);
     let heights_differ = (0..513 * 513).filter(|i| {
         let (column, row) = (i % 513, i / 513);
@@ -109,15 +112,15 @@ fn the_alps_have_the_size_of_styria_and_scales_share_samples() {
 
 #[test]
 fn the_scan_has_the_size_of_the_published_one() {
-    let scan = mesh("scene:laserscan");
-    assert_sound(&scan);
+    let scan = scenes::mesh(SceneKind::Laserscan);
+    assert_sound(scan);
     assert_eq!(scan.triangles.len(), 720_000);
     assert_within(scan.extent(), 1032.0, 1e-3);
 }
 
 #[test]
 fn scenes_are_the_same_bits_for_ever() {
-    let prints = SceneKind::ALL.map(|kind| fingerprint(&Scene::new(kind).mesh(&mut |_, _| ())));
+    let prints = SceneKind::ALL.map(|kind| fingerprint(scenes::mesh(kind)));
     assert_eq!(prints, [2_850_477_306, 4_213_856_385, 3_396_801_077], "city, alps, laserscan");
 }
 

@@ -32,7 +32,7 @@ pub struct Options {
     pub budget: Budget,
     /// What a frame may do.
     pub work_cap: WorkCap,
-    /// Full speed of the eye, in object units a frame; by default the path's 99th percentile.
+    /// Full speed of the eye, in object units a frame, for the strategies that go by one; by default the path's 99th percentile.
     pub rho: Option<f64>,
     /// Full speed of turning, in radians a frame; by default the path's 99th percentile.
     pub omega: Option<f64>,
@@ -91,10 +91,10 @@ impl Default for Paging {
 }
 
 impl Default for Options {
-    /// Every strategy, screen error of 1 pixel at 1080 lines, no budget, speeds of the path, no check.
+    /// [`Strategy::COMPARED`], screen error of 1 pixel at 1080 lines, no budget, speeds of the path, no check.
     fn default() -> Self {
         Self {
-            strategies: Strategy::ALL.to_vec(),
+            strategies: Strategy::COMPARED.to_vec(),
             criterion: Criterion::default(),
             normal_cone: false,
             theta: theta_of_pixels(1.0, 1080),

@@ -161,7 +161,8 @@ pub(super) fn storage(sections: &[Section]) -> Table {
 /// The runs of a scene along one path that tell of paging: those of the strategy that is best at it, and of backends that
 /// page.
 pub(super) fn paged<'a>(runs: &[&'a Run]) -> Vec<&'a Run> {
-    let strategies = [Strategy::Event, Strategy::Front, Strategy::TopDown, Strategy::EventPublished];
+    let strategies =
+        [Strategy::Event, Strategy::EventQueue, Strategy::Front, Strategy::TopDown, Strategy::EventPublished];
     let is_there = |strategy: &Strategy| runs.iter().any(|run| run.strategy == *strategy);
     let strategy = strategies.into_iter().find(is_there);
     let pages = |run: &Run| run.backend != Backend::InMemory.name();

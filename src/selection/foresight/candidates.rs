@@ -14,6 +14,7 @@ use crate::in_play::{Kind, Slot};
 use crate::motion::{Course, Travel};
 use crate::packed::{Block, LANES};
 use crate::refine::Finder;
+use crate::refine::front::FrontScan;
 
 #[derive(Default)]
 pub(super) struct Candidates {
@@ -84,16 +85,11 @@ impl Candidates {
                 let travels =
                     || (0..ahead.instants).map(|at| Travel::between(ahead.frame.views, ahead.at(at)));
                 event.for_each_due(travels, |event| take(event.slot, event.kind(), &event.bounds));
-            }
-            Finder::Front(scan) => {
-                for (packed, kind) in scan.watched() {
-                    for (block, used) in packed.blocks() {
-                        for_each_bit(within_reach(block, used, kind, &glasses), |lane| {
-                            take(Slot(block.tag[lane]), kind, &block.bounds(lane));
-                        });
-                    }
+                if let Some(near) = event.near() {
+                    pass_on(near, &glasses, &mut take);
                 }
             }
+            Finder::Front(scan) => pass_on(scan, &glasses, &mut take),
             Finder::TopDown(_) | Finder::Published(_) => {
                 let mut blocks = [(Kind::Unfold, Gathered::default()), (Kind::Fold, Gathered::default())];
                 let mut pass = |kind, gathered: &mut Gathered| {
@@ -115,6 +111,17 @@ impl Candidates {
         }
         sift(&mut self.folded, Kind::Unfold, ahead, &glasses, &mut put);
         sift(&mut self.unfolded, Kind::Fold, ahead, &glasses, &mut put);
+    }
+}
+
+/// Passes on what is scanned and within reach.
+fn pass_on(scan: &FrontScan, glasses: &Glasses, take: &mut impl FnMut(Slot, Kind, &Bounds)) {
+    for (packed, kind) in scan.watched() {
+        for (block, used) in packed.blocks() {
+            for_each_bit(within_reach(block, used, kind, glasses), |lane| {
+                take(Slot(block.tag[lane]), kind, &block.bounds(lane));
+            });
+        }
     }
 }
 

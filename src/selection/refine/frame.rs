@@ -4,7 +4,7 @@ use vertex_tree::Bounds;
 
 use crate::criterion::Criterion;
 use crate::in_play::{Kind, Slot};
-use crate::motion::{Course, Motion, Speed};
+use crate::motion::{Course, Motion, Speed, Travel};
 use crate::normal_cone::{self, Cones};
 use crate::view::View;
 
@@ -13,7 +13,12 @@ pub(crate) struct Frame<'a> {
     pub criterion: Criterion,
     pub views: &'a [View],
     pub speed: Speed,
+    /// The motion in terms of the declared speed.
     pub motion: Motion,
+    /// The motion from the last frame; `None` if the views can not be compared.
+    pub travel: Option<Travel<'a>>,
+    /// Whether foresight looks at the nodes that can change soon.
+    pub looks_ahead: bool,
     /// Of the nodes in play, where the normal-cone test is part of the criterion.
     pub cones: Option<&'a Cones>,
 }

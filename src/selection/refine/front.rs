@@ -4,7 +4,7 @@
 //! instructions. Half of the nodes that top-down visits lie above the front and need no test.
 
 use multiversion::multiversion;
-use vertex_tree::Bounds;
+use vertex_tree::{Bounds, prefetch};
 
 use super::frame::{Flips, Frame};
 use super::watch::Watch;
@@ -23,10 +23,15 @@ pub(crate) struct FrontScan {
 
 impl FrontScan {
     pub fn find(&self, frame: &Frame, flips: &mut Flips) {
-        flips.tests += (self.folded.len() + self.unfolded.len()) as u64;
         let lenses = Lenses::new(frame.criterion, frame.views);
-        scan(&self.folded, Kind::Unfold, lenses.as_ref().map(Lenses::as_slice), frame, &mut flips.unfold);
-        scan(&self.unfolded, Kind::Fold, lenses.as_ref().map(Lenses::as_slice), frame, &mut flips.fold);
+        self.find_with(frame, lenses.as_ref().map(Lenses::as_slice), flips);
+    }
+
+    /// The same with the views' lenses, if there are any.
+    pub fn find_with(&self, frame: &Frame, lenses: Option<&[Lens]>, flips: &mut Flips) {
+        flips.tests += self.len() as u64;
+        scan(&self.folded, Kind::Unfold, lenses, frame, &mut flips.unfold);
+        scan(&self.unfolded, Kind::Fold, lenses, frame, &mut flips.fold);
     }
 
     /// What is watched, boundary nodes and collapsible nodes; tags are slots.
@@ -58,7 +63,14 @@ impl FrontScan {
         assert_eq!(places, self.folded.len() + self.unfolded.len(), "slots that are watched");
     }
 
-    fn put(&mut self, slot: Slot, kind: Kind, bounds: Bounds) {
+    /// How many nodes are watched.
+    pub fn len(&self) -> usize {
+        self.folded.len() + self.unfolded.len()
+    }
+
+    /// Watches a node, if it is not watched already.
+    #[inline]
+    pub fn put(&mut self, slot: Slot, kind: Kind, bounds: Bounds) {
         if self.place.len() <= slot.index() {
             self.place.resize(slot.index() + 1, 0);
         }
@@ -68,6 +80,23 @@ impl FrontScan {
             let at = packed.len() as u32 - 1;
             self.place[slot.index()] = 2 * at + u32::from(kind == Kind::Fold) + 2;
         }
+    }
+
+    /// No longer watches a node. Whether it did.
+    #[inline]
+    pub fn remove(&mut self, slot: Slot) -> bool {
+        let Some(place) = self.place.get_mut(slot.index()) else { return false };
+        let Some(place) = std::mem::take(place).checked_sub(2) else { return false };
+        if let Some(moved) = self.packed(place % 2 == 1).swap_remove(place as usize / 2) {
+            self.place[moved as usize] = place + 2;
+        }
+        true
+    }
+
+    /// Starts to read where a node is watched.
+    #[inline(always)]
+    pub fn prefetch_place(&self, slot: Slot) {
+        prefetch(&self.place, slot.index());
     }
 
     fn packed(&mut self, unfolded: bool) -> &mut Packed {
@@ -80,12 +109,9 @@ impl Watch for FrontScan {
         self.put(slot, kind, bounds);
     }
 
+    #[inline]
     fn unwatch(&mut self, slot: Slot) {
-        let Some(place) = self.place.get_mut(slot.index()) else { return };
-        let Some(place) = std::mem::take(place).checked_sub(2) else { return };
-        if let Some(moved) = self.packed(place % 2 == 1).swap_remove(place as usize / 2) {
-            self.place[moved as usize] = place + 2;
-        }
+        self.remove(slot);
     }
 
     fn refused(&mut self, slot: Slot, kind: Kind, bounds: Bounds) {

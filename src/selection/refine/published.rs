@@ -251,7 +251,15 @@ mod tests {
     fn until(views: &[View], kind: Kind, bounds: &Bounds, rho: f64, omega: f64) -> f64 {
         let speed = Speed { rho, omega, kappa: 0.0 };
         let criterion = Criterion::ScreenError;
-        let frame = Frame { criterion, views, speed, motion: Motion::Rest, cones: None };
+        let frame = Frame {
+            criterion,
+            views,
+            speed,
+            motion: Motion::Rest,
+            travel: None,
+            looks_ahead: false,
+            cones: None,
+        };
         frames_until(&frame, kind, bounds)
     }
 
@@ -362,7 +370,18 @@ mod tests {
         };
         let passed = |before: &[View], views: &[View]| {
             let criterion = Criterion::ScreenError;
-            frames_passed(&Frame { criterion, views, speed, motion: Motion::Rest, cones: None }, before)
+            frames_passed(
+                &Frame {
+                    criterion,
+                    views,
+                    speed,
+                    motion: Motion::Rest,
+                    travel: None,
+                    looks_ahead: false,
+                    cones: None,
+                },
+                before,
+            )
         };
         let one = |after: View| passed(&[at(0.0)], &[after]);
         assert_eq!([at(0.0), at(0.4), at(0.5), at(0.6), at(3.0), at(-3.1)].map(one), [1, 1, 1, 2, 6, 7]);
@@ -394,6 +413,8 @@ mod tests {
                 views: &after,
                 speed,
                 motion: Motion::Rest,
+                travel: None,
+                looks_ahead: false,
                 cones: None,
             };
             let mut flips = Flips { tests: 3, ..Flips::default() };
@@ -479,7 +500,15 @@ mod tests {
         let views = [view(0.01)];
         let speed = Speed { rho: 1.0, omega: 1.0, kappa: 0.0 };
         let criterion = Criterion::ScreenError;
-        let frame = Frame { criterion, views: &views, speed, motion: Motion::Rest, cones: None };
+        let frame = Frame {
+            criterion,
+            views: &views,
+            speed,
+            motion: Motion::Rest,
+            travel: None,
+            looks_ahead: false,
+            cones: None,
+        };
         let bounds = buffer.front.bounds(Slot(2));
         let watched = |buffer: &Buffer| {
             let mut watched = Vec::new();

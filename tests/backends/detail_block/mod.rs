@@ -4,11 +4,11 @@
 mod cones;
 mod paging;
 
-use crate::common::{data, meshes, seeded};
+use crate::common::{data, meshes, scenes, seeded};
 use crate::flights::flies;
 use foldfront::CollapseLog;
 use foldfront::construction::simplify;
-use foldfront::experiment::scene::{Scene, SceneKind};
+use foldfront::experiment::scene::SceneKind;
 
 fn closed() -> CollapseLog {
     data::log(meshes::with_handles(2, 14))
@@ -52,9 +52,8 @@ fn joined_components_fly_apart() {
 
 #[test]
 fn built_in_scenes_fly() {
-    for kind in [SceneKind::City, SceneKind::Alps, SceneKind::Laserscan] {
-        let mesh = Scene::new(kind).mesh(&mut |_, _| ());
-        flies(kind.name(), &data::log(mesh), false, false);
+    for kind in SceneKind::ALL {
+        flies(kind.name(), scenes::log(kind), false, false);
     }
 }
 

@@ -7,7 +7,8 @@
 //! Changed since: `laserscan-wild meta-node schedule`, where seven pages are read two frames earlier. How long reads take is noted
 //! after what was known of it has faded for the frame, in all backends. And `mt-partition schedule`, all six: what a read brings
 //! beside what was foreseen stays until what else is under way has come, so that it is not read again: fewer reads and bytes on every
-//! path, and no more misses on any (`benches/record/2026-11-30-trajectories.md`).
+//! path, and no more misses on any (`benches/record/2026-11-30-trajectories.md`). What is timed is found by the queue alone, which `event` was
+//! when the table was made: in what order changes are found decides which of two pages is read first.
 
 use std::fmt::Write;
 use std::path::Path as FilePath;
@@ -17,7 +18,7 @@ use detail_block::XfmTree;
 use foldfront::construction::simplify;
 use foldfront::experiment::compare::{Loading, Options, Pace, Subject};
 use foldfront::experiment::path::{Path, recorded};
-use foldfront::experiment::scene::{Scene, SceneKind};
+use foldfront::experiment::scene::SceneKind;
 use foldfront::experiment::store::{self, Backend, BuildOptions, Store};
 use foldfront::page_store::Simulated;
 use foldfront::selection::engine::{Engine, Settings};
@@ -28,6 +29,8 @@ use foldfront::vertex_tree::{Hierarchy, NullSink, Prefetch, Refine};
 use in_memory::InMemoryTree;
 use meta_node::MetaNodeTree;
 use mt_partition::MtTree;
+
+use crate::common::scenes;
 
 const LATENCY: Duration = Duration::from_millis(5);
 
@@ -53,7 +56,7 @@ fn settled<T: Hierarchy + Refine<NullSink>>(tree: T, path: &Path, strategy: Stra
 /// The lines of a scene.
 fn table(kind: SceneKind, folder: &FilePath) -> String {
     let mut lines = String::new();
-    let mesh = Scene::new(kind).mesh(&mut |_, _| ());
+    let mesh = scenes::mesh(kind).clone();
     // As on the command line, where the blocks of the city are joined.
     let mut options = simplify::Options::default();
     options.merge_components = kind == SceneKind::City;
@@ -66,7 +69,7 @@ fn table(kind: SceneKind, folder: &FilePath) -> String {
         writeln!(lines, "{} file {name} {:016x}", kind.name(), digest(words)).unwrap();
         let mut subject = Subject::of_store(kind.name(), Store::open(&file).unwrap());
         for path in recorded(kind).unwrap() {
-            for strategy in Strategy::ALL {
+            for strategy in Strategy::COMPARED {
                 let digest = match Store::open(&file).unwrap() {
                     Store::InMemory(hierarchy, _) => settled(InMemoryTree::new(hierarchy), &path, strategy),
                     Store::MetaNode(file) => {
@@ -91,7 +94,7 @@ fn table(kind: SceneKind, folder: &FilePath) -> String {
                 continue;
             }
             let timed = Options {
-                strategies: vec![Strategy::Event],
+                strategies: vec![Strategy::EventQueue],
                 prefetch: vec![Loading::Paper, Loading::Schedule, Loading::None],
                 pace: Pace::Simulated(Duration::from_secs_f64(1.0 / 60.0), Simulated::with_latency(LATENCY)),
                 ..Options::default()

@@ -88,7 +88,7 @@ fn no_declared_speed_costs_tests_and_no_cut() {
             Engine::new(tree, NullSink, Settings { strategy, ..settings }).unwrap()
         };
         // The front scan tests all that is watched in every frame.
-        let (mut engine, mut all) = (engine(Strategy::Event), engine(Strategy::Front));
+        let (mut engine, mut all) = (engine(Strategy::EventQueue), engine(Strategy::Front));
         let mut view = look(1.0, 1.0, 0.02, &mut random);
         for frame in 0..600 {
             let before = view;

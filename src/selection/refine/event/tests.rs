@@ -9,6 +9,7 @@ use rand_pcg::Pcg64Mcg;
 
 use super::*;
 use crate::criterion::Criterion;
+use crate::view::View;
 
 const SPEED: Speed = Speed { rho: 1.0, omega: 0.1, kappa: 2.0 };
 
@@ -27,22 +28,31 @@ struct Seen {
 
 impl Flight {
     fn new(view: View) -> Self {
-        Self { strategy: EventDriven::new(), views: vec![view], speed: SPEED }
+        Self { strategy: EventDriven::queue_alone(), views: vec![view], speed: SPEED }
     }
 
-    fn frame<R>(&mut self, next: &[View], act: impl FnOnce(&mut EventDriven, &Frame, &[View]) -> R) -> R {
+    fn frame<R>(&mut self, next: &[View], act: impl FnOnce(&mut EventDriven, &Frame) -> R) -> R {
         let before = std::mem::replace(&mut self.views, next.to_vec());
-        let motion = Odometer::default().advance(&self.speed.into(), &before, next);
+        let travel = Travel::between(&before, next);
+        let motion = Odometer::default().advance_by(&self.speed.into(), travel.as_ref());
         let criterion = Criterion::ScreenError;
-        let frame = Frame { criterion, views: next, speed: self.speed, motion, cones: None };
-        act(&mut self.strategy, &frame, &before)
+        let frame = Frame {
+            criterion,
+            views: next,
+            speed: self.speed,
+            motion,
+            travel,
+            looks_ahead: false,
+            cones: None,
+        };
+        act(&mut self.strategy, &frame)
     }
 
     /// To other views; what flips is not watched any more.
     fn go(&mut self, next: &[View]) -> Seen {
-        self.frame(next, |strategy, frame, before| {
+        self.frame(next, |strategy, frame| {
             let mut flips = Flips::default();
-            strategy.find(frame, before, &mut flips);
+            strategy.find(frame, &mut flips);
             flips.unfold.append(&mut flips.fold);
             flips.unfold.iter().for_each(|&slot| strategy.changed(slot));
             flips.tests += strategy.settle(frame);
@@ -58,7 +68,7 @@ impl Flight {
 
     fn watch(&mut self, slot: u32, kind: Kind, bounds: Bounds) {
         let views = self.views.clone();
-        self.frame(&views, |strategy, frame, _| strategy.watch(frame, Slot(slot), kind, bounds));
+        self.frame(&views, |strategy, frame| strategy.watch(frame, Slot(slot), kind, bounds));
     }
 
     fn course(&self) -> Course {
@@ -329,7 +339,7 @@ fn what_is_refused_is_found_again_at_rest() {
     let mut flight = Flight::new(view().with_eye(DVec3::new(-5.0, 0.0, 0.0)).unwrap());
     let views = flight.views.clone();
     for _ in 0..3 {
-        flight.frame(&views, |strategy, _, _| strategy.refused(Slot(3), Kind::Unfold, NODE));
+        flight.frame(&views, |strategy, _| strategy.refused(Slot(3), Kind::Unfold, NODE));
         let mut due = Vec::new();
         flight.strategy.for_each_due(std::iter::empty, |event| due.push(event.slot));
         assert_eq!(due, [Slot(3)]);
@@ -350,7 +360,7 @@ fn batches_are_tested_whole() {
         (1..=count).filter(|slot| slot % 4 == 0).for_each(|slot| flight.strategy.unwatch(Slot(slot)));
         let left: Vec<u32> = (1..=count).filter(|slot| slot % 4 != 0).collect();
         let same = flight.views.clone();
-        let tests = flight.frame(&same, |strategy, frame, _| strategy.settle(frame));
+        let tests = flight.frame(&same, EventDriven::settle);
         assert_eq!(tests, left.len() as u64);
         (1..=count).filter(|slot| slot % 5 == 0).for_each(|slot| flight.strategy.unwatch(Slot(slot)));
         let left: Vec<Slot> = left.into_iter().filter(|slot| slot % 5 != 0).map(Slot).collect();
