@@ -28,6 +28,7 @@ mod wheel;
 
 use vertex_tree::{Bounds, prefetch};
 
+pub(crate) use self::event::ticks;
 pub use self::event::{DUE, Event, HORIZON, TICKS_PER_FRAME};
 use self::pool::{Bucket, CHUNK, Pool};
 use self::wheel::{LEVELS, SLOTS, Wheel};

@@ -71,7 +71,8 @@ impl<S: Storage> Arranged<S> {
     /// Writes the blocks, and says how long each is.
     fn write_blocks(&mut self, out: &mut impl Write, storage: &S) -> Result<S::Array<u32>, Failure> {
         let levels = self.header.levels;
-        let mut sorter = storage.sorter::<RECORD>(25);
+        // The tables that are there, and what the allocator keeps of those before them, take most of the memory by now.
+        let mut sorter = storage.sorter::<RECORD>(10);
         for n in 0..self.merges.len() {
             storage.check_stop()?;
             let (merge, node, planned) = (self.merges.get(n)?, self.nodes.get(n)?, self.layout.nodes.get(n)?);

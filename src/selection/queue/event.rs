@@ -10,6 +10,12 @@ pub const TICKS_PER_FRAME: f64 = 512.0;
 /// The furthest that an event is scheduled ahead, in ticks: 4 million frames.
 pub const HORIZON: u32 = 1 << 31;
 
+/// Ticks in so many frames: to multiply by a power of two is exact, and what is further than the horizon makes no difference.
+#[inline(always)]
+pub(crate) fn ticks(frames: [f32; DUE]) -> [u32; DUE] {
+    frames.map(|frames| (frames * TICKS_PER_FRAME as f32).min(HORIZON as f32 / 2.0) as i32 as u32)
+}
+
 /// A test that is due some time. Half a cache line.
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[repr(C, align(32))]

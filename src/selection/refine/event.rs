@@ -38,7 +38,7 @@ use crate::filter::{Lens, Lenses, Rates, earliest};
 use crate::in_play::{Kind, Slot};
 use crate::motion::{Course, Motion, Odometer, Speed, Travel};
 use crate::packed::{Block, LANES};
-use crate::queue::{Event, EventQueue, HORIZON, OnClock, TICKS_PER_FRAME};
+use crate::queue::{Event, EventQueue, OnClock, TICKS_PER_FRAME, ticks};
 
 /// Clocks that run at the same time. When a new course needs one, the oldest gives up its events: they are tested early.
 const CLOCKS: usize = 16;
@@ -138,8 +138,8 @@ impl EventDriven {
         {
             near.scan.find_with(frame, lenses, flips);
             if let Some(lenses) = lenses {
-                let bench = Bench { frame, course: self.clocks[self.clock].course, clock: self.clock };
-                self.looks.again = near.look_again(&bench, lenses, &mut self.queue);
+                let course = &self.clocks[self.clock].course;
+                self.looks.again = near.look_again(frame, lenses, course, &mut self.queue, self.clock);
                 flips.tests += self.looks.again;
             }
         }
@@ -461,12 +461,6 @@ impl<'a> Place<'a> {
             self.queue.schedule_ticks(ticks, *event);
         }
     }
-}
-
-/// To multiply by a power of two is exact; what is further than the horizon makes no difference.
-#[inline(always)]
-fn ticks(frames: [f32; LANES]) -> [u32; LANES] {
-    frames.map(|frames| (frames * TICKS_PER_FRAME as f32).min(HORIZON as f32 / 2.0) as i32 as u32)
 }
 
 /// Events to be tested together.

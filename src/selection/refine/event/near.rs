@@ -10,13 +10,14 @@
 
 use multiversion::multiversion;
 
+use super::super::frame::Frame;
 use super::super::front::FrontScan;
-use super::Bench;
 use super::balance::{Balance, Looks};
 use crate::filter::{Lens, Rates, earliest};
 use crate::in_play::{Kind, Slot};
+use crate::motion::Course;
 use crate::packed::{Block, LANES};
-use crate::queue::{EventQueue, HORIZON, TICKS_PER_FRAME};
+use crate::queue::{EventQueue, HORIZON, TICKS_PER_FRAME, ticks};
 
 /// Frames within which a node is near.
 const NEAR: f64 = 16.0;
@@ -154,8 +155,16 @@ impl Near {
         self.is_busy || self.balance.scans_everything() || self.mostly > MOSTLY
     }
 
-    /// Looks at some of the nodes again, and schedules those that are not near any more. Returns how many it has looked at.
-    pub fn look_again(&mut self, bench: &Bench, lenses: &[Lens], queue: &mut EventQueue) -> u64 {
+    /// Looks at some of the nodes again, and schedules those that are not near any more, on a clock that has this course. Returns
+    /// how many it has looked at.
+    pub fn look_again(
+        &mut self,
+        frame: &Frame,
+        lenses: &[Lens],
+        course: &Course,
+        queue: &mut EventQueue,
+        clock: usize,
+    ) -> u64 {
         if self.is_busy || self.balance.scans_everything() {
             return 0;
         }
@@ -166,7 +175,7 @@ impl Near {
         if blocks == 0 {
             return 0;
         }
-        let rates = Rates::new(&bench.course);
+        let rates = Rates::new(course);
         let (mut seen, mut gone) = (0, 0_u64);
         for _ in 0..blocks {
             let [(folded, _), (unfolded, _)] = self.scan.watched();
@@ -182,10 +191,10 @@ impl Near {
             let slots = block.tag.map(Slot);
             let block = Block { tag: [u32::from(kind == Kind::Fold); LANES], ..*block };
             let mut ticks = ticks_of(&block, lenses, &rates);
-            if bench.frame.cones.is_some() && kind == Kind::Fold {
+            if frame.cones.is_some() && kind == Kind::Fold {
                 // The filter knows of no cones: they can make a fold earlier.
                 for (lane, ticks) in ticks[..used].iter_mut().enumerate() {
-                    let frames = bench.frame.earliest(&bench.course, slots[lane], kind, &block.bounds(lane));
+                    let frames = frame.earliest(course, slots[lane], kind, &block.bounds(lane));
                     *ticks = (frames * TICKS_PER_FRAME) as u32;
                 }
             }
@@ -194,7 +203,7 @@ impl Near {
             for lane in (0..used).filter(|&lane| ticks[lane] > limit) {
                 self.scan.remove(slots[lane]);
                 let event = queue.event(slots[lane], kind, block.bounds(lane));
-                queue.on(bench.clock).schedule_ticks(ticks[lane], event);
+                queue.on(clock).schedule_ticks(ticks[lane], event);
                 gone += 1;
             }
         }
@@ -214,7 +223,7 @@ impl Near {
 /// The ticks before which no node of a block can have to change; tags say of which kind they are.
 #[multiversion(targets("x86_64+avx2+lzcnt+bmi1+bmi2", "x86_64+sse4.1"))]
 fn ticks_of(block: &Block, lenses: &[Lens], rates: &Rates) -> [u32; LANES] {
-    super::ticks(earliest(block, lenses, rates))
+    ticks(earliest(block, lenses, rates))
 }
 
 #[cfg(test)]
