@@ -11,11 +11,11 @@
 //!
 //! Hierarchies are kept in `target/tmp/strategies`, as by the benchmark `strategies`.
 
+mod kept;
+
 use std::path::PathBuf;
 use std::sync::Arc;
 
-use foldfront::CollapseLog;
-use foldfront::collapse_log::{read_log, write_log};
 use foldfront::construction::simplify;
 use foldfront::experiment::scene::Scene;
 use foldfront::selection::engine::{Engine, Settings};
@@ -146,7 +146,8 @@ fn main() {
         words.into_iter().partition(|word| word.starts_with("front-"));
     let is_chosen_front = |front: u64| fronts.is_empty() || fronts.contains(&format!("front-{front}"));
     let is_chosen = |motion: &str| motions.is_empty() || motions.iter().any(|word| word == motion);
-    let log = cached();
+    let scene = Scene::parse("scene:laserscan@2").expect("a scene");
+    let log = kept::log("million", &simplify::Options::default(), || scene.mesh(&mut |_, _| {}));
     let (lo, hi) = log.mesh.bounding_box().expect("a town");
     let [lo, hi] = [lo, hi].map(|p| DVec3::from(p.map(f64::from)));
     let (middle, extent) = ((lo + hi) / 2.0, log.mesh.extent());
@@ -202,18 +203,6 @@ fn main() {
     if let Some(file) = svg {
         draw(&file, &cells).expect("the picture can be written");
     }
-}
-
-fn cached() -> CollapseLog {
-    let folder = PathBuf::from(env!("CARGO_TARGET_TMPDIR")).join("strategies");
-    std::fs::create_dir_all(&folder).expect("target is writable");
-    let file = folder.join("million.log");
-    read_log(&file).unwrap_or_else(|_| {
-        let mesh = Scene::parse("scene:laserscan@2").expect("a scene").mesh(&mut |_, _| {});
-        let (log, _) = simplify::build(mesh, &simplify::Options::default(), &mut |_, _| {}).expect("a mesh");
-        write_log(&file, &log).expect("target is writable");
-        log
-    })
 }
 
 /// A panel for each of the steady motions: fronts to the right, speeds upwards, and as colour how the time of the event

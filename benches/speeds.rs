@@ -8,11 +8,13 @@
 //!
 //! Hierarchies are kept in `target/tmp/strategies`, as by the benchmark `strategies`.
 
+mod kept;
+
 use std::path::PathBuf;
 use std::sync::Arc;
 
+use foldfront::Bounds;
 use foldfront::CollapseLog;
-use foldfront::collapse_log::{read_log, write_log};
 use foldfront::construction::{mesh_io, simplify};
 use foldfront::experiment::path::{self, Path};
 use foldfront::experiment::scene::{Scene, SceneKind};
@@ -20,7 +22,6 @@ use foldfront::selection::engine::{Engine, Settings};
 use foldfront::selection::refine::Strategy;
 use foldfront::selection::view::{View, theta_of_pixels};
 use foldfront::vertex_tree::NullSink;
-use foldfront::{Bounds, Mesh};
 use in_memory::{InMemoryHierarchy, InMemoryTree};
 
 const RUNS: usize = 5;
@@ -35,7 +36,7 @@ fn main() {
         let scene = Scene::new(kind);
         let mut build = simplify::Options::default();
         build.merge_components = scene.is_many_objects();
-        let log = cached(kind.name(), &build, || scene.mesh(&mut |_, _| {}));
+        let log = kept::log(kind.name(), &build, || scene.mesh(&mut |_, _| {}));
         let [calm, _] = path::recorded(kind).expect("recorded paths are valid");
         table(&calm, &log);
     }
@@ -44,7 +45,7 @@ fn main() {
         let file = data.join(format!("meshes/{name}.ply"));
         if is_chosen(name) && file.exists() {
             let read = || mesh_io::read(&[&file], &mut |_, _| {}).expect("the data are readable");
-            let log = cached(name, &simplify::Options::default(), read);
+            let log = kept::log(name, &simplify::Options::default(), read);
             let orbit =
                 Path { name: name.to_owned(), ..path::around(&log.mesh).expect("a place for a camera") };
             table(&orbit, &log);
@@ -128,15 +129,4 @@ fn scaled(log: &CollapseLog, scale: f32) -> CollapseLog {
         collapse.bounds = Bounds { center, radius: radius * scale, eps: eps * scale };
     }
     log
-}
-
-fn cached(name: &str, build: &simplify::Options, mesh: impl FnOnce() -> Mesh) -> CollapseLog {
-    let folder = PathBuf::from(env!("CARGO_TARGET_TMPDIR")).join("strategies");
-    std::fs::create_dir_all(&folder).expect("target is writable");
-    let file = folder.join(format!("{name}.log"));
-    read_log(&file).unwrap_or_else(|_| {
-        let (log, _) = simplify::build(mesh(), build, &mut |_, _| {}).expect("the mesh is valid");
-        write_log(&file, &log).expect("target is writable");
-        log
-    })
 }

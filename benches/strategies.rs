@@ -10,11 +10,12 @@
 
 #![expect(clippy::disallowed_methods, reason = "shapes to measure with")]
 
+mod kept;
+
 use std::path::PathBuf;
 use std::sync::Arc;
 use std::time::Duration;
 
-use foldfront::collapse_log::{read_log, write_log};
 use foldfront::construction::mesh_io;
 use foldfront::construction::simplify;
 use foldfront::experiment::path::{self, Path, Pose};
@@ -41,7 +42,7 @@ fn main() {
             let scene = Scene::new(kind);
             let mut build = simplify::Options::default();
             build.merge_components = scene.is_many_objects();
-            let hierarchy = arrange(&cached(kind.name(), &build, || scene.mesh(&mut |_, _| {})));
+            let hierarchy = arrange(&kept::log(kind.name(), &build, || scene.mesh(&mut |_, _| {})));
             let [calm, wild] = path::recorded(kind).expect("recorded paths are valid");
             calm_tables(&hierarchy, &calm, 1.0);
             wild_table(&hierarchy, &wild);
@@ -50,7 +51,7 @@ fn main() {
     // Everything in view and next to everything unfolded: what a test costs where the front leaves the caches.
     if is_chosen("million") {
         let scene = Scene::parse("scene:laserscan@2").expect("a scene");
-        let log = cached("million", &simplify::Options::default(), || scene.mesh(&mut |_, _| {}));
+        let log = kept::log("million", &simplify::Options::default(), || scene.mesh(&mut |_, _| {}));
         let mut walk =
             Path { name: "million".to_owned(), ..path::around(&log.mesh).expect("a place for a camera") };
         walk.frames.truncate(40);
@@ -60,7 +61,7 @@ fn main() {
     for name in ["bunny", "dragon"] {
         let file = data.join(format!("meshes/{name}.ply"));
         if is_chosen(name) && file.exists() {
-            let log = cached(name, &simplify::Options::default(), || read(&[file]));
+            let log = kept::log(name, &simplify::Options::default(), || read(&[file]));
             let walk =
                 Path { name: name.to_owned(), ..path::around(&log.mesh).expect("a place for a camera") };
             calm_tables(&arrange(&log), &walk, 1.0);
@@ -68,12 +69,12 @@ fn main() {
     }
     let tiles = ["N36W118", "N36W119", "N37W118", "N37W119"].map(|t| data.join(format!("terrain/{t}.hgt")));
     if is_chosen("sierra") && tiles[0].exists() {
-        let log = cached("sierra", &simplify::Options::default(), || read(&tiles));
+        let log = kept::log("sierra", &simplify::Options::default(), || read(&tiles));
         let walk = flight(&log.mesh, "sierra flight", DVec3::X);
         // Out of the mosaic, with the neighbours behind.
         let outward = flight(&log.mesh, "outward flight", DVec3::new(-1.0, -1.0, 0.0).normalize());
         let hierarchy = arrange(&log);
-        let quarter = cached("quarter", &simplify::Options::default(), || quarter(&log.mesh));
+        let quarter = kept::log("quarter", &simplify::Options::default(), || quarter(&log.mesh));
         drop(log);
         calm_tables(&hierarchy, &walk, 1.0);
         calm_tables(&hierarchy, &walk, 0.25);
@@ -95,18 +96,6 @@ fn main() {
 
 fn read(files: &[PathBuf]) -> Mesh {
     mesh_io::read(files, &mut |_, _| {}).expect("the data are readable")
-}
-
-/// The log of a mesh, kept in the target folder: construction takes longer than the benchmark.
-fn cached(name: &str, build: &simplify::Options, mesh: impl FnOnce() -> Mesh) -> CollapseLog {
-    let folder = PathBuf::from(env!("CARGO_TARGET_TMPDIR")).join("strategies");
-    std::fs::create_dir_all(&folder).expect("target is writable");
-    let file = folder.join(format!("{name}.log"));
-    read_log(&file).unwrap_or_else(|_| {
-        let (log, _) = simplify::build(mesh(), build, &mut |_, _| {}).expect("the mesh is valid");
-        write_log(&file, &log).expect("target is writable");
-        log
-    })
 }
 
 fn arrange(log: &CollapseLog) -> Arc<InMemoryHierarchy> {
